@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.quantities.bsdf_holes import Filled, filled
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.quadrature import gauss_legendre
 from etendue.quantities.report import Complaint
@@ -332,16 +333,23 @@ class BsdfSlice:
 
     @functools.cached_property
     def held(self) -> Array:
-        """Values of the grid, those that lie beyond the hemisphere or were not measured replaced by the last before them."""
-        assert self.grid is not None  # noqa: S101 - `at` says so
-        beyond = np.isnan(self.directions[..., 0])
+        """Values of the grid without holes, as `filled` says; those beyond the hemisphere are the last before them."""
+        return self._filled.values
+
+    @functools.cached_property
+    def holes(self) -> npt.NDArray[np.bool_]:
+        """Which values of the grid were not measured and lie between those that were, of the shape of `values`."""
+        return self._filled.between
+
+    @functools.cached_property
+    def _filled(self) -> Filled:
+        assert self.grid is not None  # noqa: S101 - callers say so
+        within = ~np.isnan(self.directions[..., 0])
         if self.grid.azimuth.size == 1:
             # It stands for all azimuths, some of which reach farther within the hemisphere than its own.
-            beyond = self.grid.radial > _reach(self.grid, self)
-        known = ~(beyond | np.isnan(self.values))
-        last = np.maximum.accumulate(np.where(known, np.arange(self.values.shape[1]), -1), axis=1)
-        held = np.take_along_axis(self.values, np.maximum(last, 0), axis=1)
-        return np.asarray(np.where(last >= 0, held, self.values[known].min() if known.any() else np.nan))
+            within = np.broadcast_to(self.grid.radial <= _reach(self.grid, self), self.values.shape)
+        frame = self.grid.frame
+        return filled(self.values, self.grid.radial, self.grid.azimuth, within, degrees=frame != "cosines")
 
     def integral(self) -> float:
         """∫ f cosθ dΩ: the share of the flux that is scattered (directional-hemispherical).

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from etendue.description.files import Files
 from etendue.errors import ArgumentError
@@ -27,6 +28,9 @@ EXTRAPOLATED = 0.02
 
 FAINT = 1e-4
 """Share of the light that may as well."""
+
+LARGE_HOLES, MANY_HOLES = 0.1, 0.25
+"""Parts of the light of a slice, and of its values, that may lie in holes before they are a warning and no note."""
 
 UNLIKE = 0.1
 """Part of its light by which a slice may differ from its mirror image without a word, if it is said to be that."""
@@ -190,6 +194,7 @@ def _told(data: BsdfData) -> Iterable[Complaint]:
         if share > 1.0 + CLOSE:
             yield Complaint("warning", place, f"{way} {share:.6g} of the light; scaled to 1")
     if data.slices:
+        yield from _holes(data)
         yield from _beyond(data)
     mirrored = data.slices if data.mirrored else ()
     unlike = max(((unlike_its_image(one), one.theta) for one in mirrored), default=(0.0, 0.0))
@@ -200,6 +205,33 @@ def _told(data: BsdfData) -> Iterable[Complaint]:
             f"both sides of the plane of incidence differ by {unlike[0]:.0%} of the light, and are made equal, as the data "
             "are said to be mirrored; with mirrored=False they stay as they are",
         )
+
+
+def _holes(data: BsdfData) -> Iterable[Complaint]:
+    """What was not measured between what was, of the slice with most light there."""
+    told = [one for one in data.slices if one.grid is not None and one.holes.any()]
+    if not told:
+        return
+    light = [_light_of(one, one.holes) / max(one.integral(), FAINT) for one in told]
+    worst = int(np.argmax(light))
+    one, part = told[worst], light[worst]
+    count, all_ = int(one.holes.sum()), int((one.holes | ~np.isnan(one.values)).sum())
+    also = f" (and {len(told) - 1} more slice{'s' if len(told) > 2 else ''})" if len(told) > 1 else ""
+    grave = part > LARGE_HOLES or count > MANY_HOLES * all_
+    found = (
+        f"{count} of {all_} values were not measured and are interpolated between those that were, ln f linear in angle and "
+        f"azimuth: {part:.2g} of the light of the slice lies there"
+    )
+    yield Complaint(
+        "warning" if grave else "note",
+        f"{one.theta:g}° of incidence{also}",
+        found + (", which is as uncertain as the rule" if grave else ""),
+    )
+
+
+def _light_of(one: BsdfSlice, which: npt.NDArray[np.bool_]) -> float:
+    """The share of the flux in values of a slice on a grid."""
+    return dataclasses.replace(one, values=np.where(which, one.held, 0.0), standard_error=None).integral()
 
 
 def _beyond(data: BsdfData) -> Iterable[Complaint]:
@@ -223,9 +255,9 @@ def _extrapolated(one: BsdfSlice) -> float:
     """What a slice on a grid scatters beyond its last values: its integral less that of the same values, 0 behind them."""
     if one.grid is None:
         return 0.0
-    unknown = np.isnan(one.values)
+    unknown = np.isnan(one.values) & ~one.holes
     behind = np.logical_and.accumulate(unknown[:, ::-1], axis=1)[:, ::-1]
     radial = np.append(one.grid.radial, one.grid.radial[-1] + 1e-6)
-    values = np.pad(np.where(behind, 0.0, one.values), ((0, 0), (0, 1)))
+    values = np.pad(np.where(behind, 0.0, np.where(one.holes, one.held, one.values)), ((0, 0), (0, 1)))
     grid = PolarGrid(one.grid.frame, radial, one.grid.azimuth)
     return one.integral() - dataclasses.replace(one, grid=grid, values=values, standard_error=None).integral()
