@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
+import math
 import subprocess
 from importlib import resources
 from pathlib import Path
@@ -13,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.viewer.field_tables import FieldTables
+from etendue.viewer.subjects import map_subject
 from oracles.light_fields import SURFACES, make_field
 from scipy import ndimage
 
@@ -149,15 +152,14 @@ def test_figures_of_a_region_are_those_of_the_map(modules: Path) -> None:
     for name, value in expected.items():
         assert region[name] == pytest.approx(value, rel=2 * bound), name
     assert region["percentiles"] == pytest.approx(np.quantile(values, [0.05, 0.5, 0.95]), rel=2 * bound)
-    (ax, ay), (bx, by), (cx, cy) = corners
-    assert region["area"] == pytest.approx(0.5 * ((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)), rel=1e-9)
+    assert region["area"] == pytest.approx(inside.sum() * screen.pixel_area, rel=1e-9)
 
-    # Points even in the triangle, directions of density cos/π about the screen's normal.
+    # Points even in the pixels, directions of density cos/π about the screen's normal.
     rng = np.random.default_rng(5)
     right, up, toward = screen.axes(observer)
     n = 200_000
-    r = np.sqrt(rng.random(n))
-    share = np.stack([1 - r, r * (1 - (s := rng.random(n))), r * s], axis=1) @ np.array(corners)
+    middles = np.stack([x[inside], y[inside]], axis=1)
+    share = middles[rng.integers(0, len(middles), n)] + (rng.random((n, 2)) - 0.5) * (2.0 / columns)
     sine, turn = np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
     k = (
         np.outer(sine * np.cos(turn), right)
@@ -183,15 +185,38 @@ def test_figures_of_a_region_are_those_of_the_map(modules: Path) -> None:
     assert section[-1]["at"] + section[0]["at"] == pytest.approx(np.hypot(1.7, 0.15))
 
 
-REGION_OF_MAP = """
+REGIONS_OF_MAP = """
 import { PixelMap } from "./picture.js";
 import { measureRegion } from "./readings.js";
 import { View } from "./view.js";
-const at = new View({ ...data.view, columns: data.columns, rows: data.rows });
-const [values, errors] = [data.map.values, data.map.errors].map((list) => list.map((x) => x ?? NaN));
-const map = new PixelMap({ ...data.map, values, errors });
-console.log(JSON.stringify(await measureRegion(map, at, data.corners, () => true)));
+const map = PixelMap.read(data.map);
+const { height, ...first } = data.view;
+let at = new View({ ...first, columns: data.columns, rows: data.rows });
+if (data.shift) at = at.shifted(...data.shift);
+const found = [];
+for (const corners of data.regions) found.push(await measureRegion(map, at, corners, () => true));
+console.log(JSON.stringify(found));
 """
+
+
+def assert_figures_of(found: dict[str, Any], lmap: et.LuminanceMap, region: et.Region | et.PolygonRegion) -> None:
+    """Those of `region_statistics`, area and intensity among them, to single precision."""
+    truth = et.region_statistics(lmap, region)
+    assert (found["pixels"], found["dead"]) == (truth.pixels, truth.dead_pixels)
+    inside = region.mask(lmap.screen)
+    apparent = lmap.screen.pixel_area * 1e-6 * lmap.screen.cosine(lmap.observer)
+    for name, value in {
+        "mean": truth.mean,
+        "error": truth.mean_error,
+        "maximum": truth.maximum,
+        "minimum": truth.minimum,
+        "uniformity": truth.uniformity,
+        "diversity": truth.uniformity_of_extremes,
+        "area": truth.area,
+        "intensity": np.nansum((lmap.values * apparent)[inside]),
+    }.items():
+        assert found[name] == pytest.approx(value, rel=3e-7), name
+    assert found["percentiles"] == pytest.approx([value for _, value in truth.percentiles], rel=3e-7)
 
 
 def test_dead_pixels_of_a_map_count_as_in_region_statistics(modules: Path) -> None:
@@ -200,28 +225,90 @@ def test_dead_pixels_of_a_map_count_as_in_region_statistics(modules: Path) -> No
     observer, screen = et.Observer(20, 30, 1000), et.Screen(40, 30, 40, 30)
     lmap = et.luminance_map(rings, observer, screen, method=et.Cone(acceptance=2))
     assert lmap.dead_pixels > 300
-    right, up, _ = screen.axes(observer)
-    arrays = {"values": lmap.values, "errors": lmap.standard_error}
-    plain = {name: np.where(np.isnan(array), None, array).ravel().tolist() for name, array in arrays.items()}
-    place = {"width": 40, "height": 30, "target": [0, 0, 0], "right": right.tolist(), "up": up.tolist()}
-    data = {
-        "map": {"columns": 40, "rows": 30, **place, **plain},
-        "view": {"theta": 20, "phi": 30, "distance": 1000, "target": [0, 0, 0], "width": 50},
-        "columns": 50,
-        "rows": 40,
-        "corners": [[-25, -8.2], [11.3, -8.2], [11.3, 9.4], [-25, 9.4]],
-    }
-    found = run(modules, REGION_OF_MAP, data)
-    truth = et.region_statistics(lmap, et.Region(-25, 11.3, -8.2, 9.4))
-    assert (found["pixels"], found["dead"]) == (truth.pixels, truth.dead_pixels)
-    for name, value in {
-        "mean": truth.mean,
-        "error": truth.mean_error,
-        "maximum": truth.maximum,
-        "minimum": 0.0,
-    }.items():
-        assert found[name] == pytest.approx(value, rel=1e-12), name
-    assert found["percentiles"] == pytest.approx([value for _, value in truth.percentiles], rel=1e-12)
+    subject = map_subject(lmap, "rings", "rings")
+    corners = [[-25, -8.2], [11.3, -8.2], [11.3, 9.4], [-25, 9.4]]
+    data = {"map": subject["map"], "view": subject["view"], "columns": 50, "rows": 40, "regions": [corners]}
+    (found,) = run(modules, REGIONS_OF_MAP, data)
+    assert_figures_of(found, lmap, et.Region(-25, 11.3, -8.2, 9.4))
+    assert found["cut"]
+
+
+PENTAGRAM = [(4 * math.sin(0.8 * math.pi * i) + 0.3, 4 * math.cos(0.8 * math.pi * i) - 0.2) for i in range(5)]
+SHAPES = {
+    "triangle": [(-6.1, -3.3), (5.2, -2.9), (1.1, 4.2)],
+    "crosses itself": [(-5, -3), (5, 3), (5, -3), (-5, 3)],
+    "pentagram": PENTAGRAM,
+    "overhangs": [(-30, -2.1), (3.3, -2.1), (3.3, 40), (-30, 40)],
+    "corners on middles": [(-2.5, -1.5), (3.5, -1.5), (3.5, 2.5), (-2.5, 2.5)],
+}
+
+
+@pytest.mark.parametrize("plane", ["view", "xy"])
+@pytest.mark.parametrize("shift", [None, [1.75, -0.6]])
+def test_figures_of_a_map_are_of_its_own_pixels(modules: Path, plane: str, shift: list[float] | None) -> None:
+    """Seen from 40° and near, through a window of other pixels: those of `region_statistics`, and the intensity of the map.
+
+    A screen in the xy plane has the cosine of its own observer, also after the picture was shifted under the region: a shift
+    by so much on the page is one by so much on the map.
+    """
+    rng = np.random.default_rng(2)
+    observer, screen = et.Observer(40, 65, 60, (0.4, -1, 2)), et.Screen(16, 10, 16, 10, plane)
+    values = rng.uniform(10, 1000, screen.shape)
+    values[rng.random(screen.shape) < 0.1] = np.nan
+    lmap = et.LuminanceMap(values, values / 10, np.full(screen.shape, 7), observer, screen)
+    subject = map_subject(lmap, "map", "map")
+    data: dict[str, Any] = {"map": subject["map"], "view": subject["view"], "columns": 37, "rows": 31, "shift": shift}
+    right, up = shift or (0.0, 0.0)
+    whole = [(-9, -6), (9, -6), (9, 6), (-9, 6)]
+    # What lies at a place of the page lies so much farther to the right and up on the map.
+    data["regions"] = [[(x - right, y - up) for x, y in corners] for corners in (*SHAPES.values(), whole)]
+    *found, all_of_it = run(modules, REGIONS_OF_MAP, data)
+    for (name, corners), one in zip(SHAPES.items(), found, strict=True):
+        assert_figures_of(one, lmap, et.PolygonRegion(corners))
+        assert one["cut"] == (name == "overhangs"), name
+    assert all_of_it["intensity"] == pytest.approx(lmap.intensity, rel=3e-7)
+    assert all_of_it["area"] == pytest.approx(160)
+
+
+REGIONS_OF_FIELD = """
+import { Field } from "./field.js";
+import { measureRegion } from "./readings.js";
+import { View } from "./view.js";
+const field = await Field.read(data.field);
+const view = new View({ ...data.view, columns: data.columns, rows: data.rows });
+const found = [];
+for (const corners of data.regions) found.push(await measureRegion(field, view, corners, () => true));
+console.log(JSON.stringify(found));
+"""
+
+
+def test_all_figures_of_a_region_are_of_the_same_pixels(modules: Path) -> None:
+    """Area, mean, intensity and flux of a region that crosses itself, and of one that reaches beyond the picture.
+
+    A plane of luminance L everywhere, in all directions: mean L, intensity L Σ A cos θ and flux π L A of the pixels that
+    `PolygonRegion` holds. The bow tie's shoelace area is 0.
+    """
+    rough = make_field(et.Plane(z=0.7, width=6, height=5, centre=(0, 0)), cells=(1, 1, 1, 1), factors=None)
+    (part,) = rough.parts
+    one = np.ones((1, 1, 1, 1), dtype=np.float32)
+    field = rough.replace(parts=(dataclasses.replace(part, ratio=one, deviation=0.02 * one),))
+    level = part.level * 1e6
+    view = {"theta": 0, "phi": 0, "distance": 30, "target": [0.2, -0.1, 0.7], "width": 4}
+    screen, observer = et.Screen(4, 3, 40, 30), et.Observer(0, 0, 30, (0.2, -0.1, 0.7))
+    shapes = {"bow tie": [(-1.03, -0.6), (1.03, 0.6), (1.03, -0.6), (-1.03, 0.6)]}
+    shapes["overhangs"] = [(0.8, -0.9), (9.0, -0.9), (9.0, 0.4), (0.8, 0.4)]
+    data = {"field": FieldTables.of(field).packed(), "view": view, "columns": 40, "rows": 30}
+    found = run(modules, REGIONS_OF_FIELD, {**data, "regions": list(shapes.values())})
+    for corners, figures in zip(shapes.values(), found, strict=True):
+        inside = et.PolygonRegion(corners).mask(screen)
+        area = inside.sum() * screen.pixel_area
+        assert figures["pixels"] == inside.sum() > 100
+        assert figures["area"] == pytest.approx(area, rel=1e-9)
+        assert figures["mean"] == pytest.approx(level, rel=1e-9)
+        assert figures["flux"]["value"] == pytest.approx(math.pi * level * area * 1e-6, rel=1e-9)
+        apparent = (screen.cosine(observer) * screen.pixel_area * 1e-6)[inside].sum()
+        assert figures["intensity"] == pytest.approx(level * apparent, rel=1e-9)
+    assert [figures["cut"] for figures in found] == [False, True]
 
 
 NUMBERS = """

@@ -110,6 +110,7 @@ def packed_map(lmap: PixelMap) -> dict[str, Any]:
         "target": list(observer.target),
         "right": right.tolist(),
         "up": up.tolist(),
+        "eye": observer.position.tolist(),
         "values": _floats(lmap.values),
         "errors": _floats(lmap.standard_error),
     }
@@ -133,7 +134,7 @@ def _seen_from(lmap: PixelMap) -> str:
 
 def _map_view(lmap: PixelMap) -> dict[str, Any]:
     observer = _observer_of(lmap)
-    return _view(observer, lmap.screen.width, lmap.screen.height)
+    return {**_view(observer, lmap.screen.width, lmap.screen.height), "plane": lmap.screen.plane}
 
 
 def _view(observer: Observer, width: float, height: float) -> dict[str, Any]:

@@ -156,6 +156,19 @@ export class Field {
     return { value, error: Math.hypot(error, left) };
   }
 
+  /** The pixels of the view, for figures of regions, read at so many points each. */
+  grid(view, samples) {
+    const { columns, rows, width } = view;
+    return {
+      columns,
+      rows,
+      steps: [width / columns, width / columns],
+      place: (column, row) => view.place(column, row),
+      cosine: (column, row) => view.cosine(column, row),
+      read: (column, row) => this.pixel(view, column, row, samples),
+    };
+  }
+
   /** How far the average over a pixel may be off by an edge before its outermost points, of which the pixels beside it tell. */
   stepBeside(view, column, row, samples, value) {
     if (samples < OWN_POINTS) return 0;

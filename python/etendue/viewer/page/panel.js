@@ -44,6 +44,7 @@ export function regionRows(figures, unit, fluxUnit) {
   if (figures.flux) rows.push(["flux, all directions", measured(figures.flux.value, figures.flux.error, fluxUnit)]);
   const dead = figures.dead > 0 ? `, ${figures.dead} dead, as 0` : "";
   rows.push(["area", `${plain(figures.area, 4)} mm²`], ["pixels", `${figures.pixels}${dead}`]);
+  if (figures.cut) rows.push(["beyond the picture", "not counted"]);
   return rows;
 }
 

@@ -1,6 +1,6 @@
 // A map of pixels that is there already: nothing can be moved in it, but everything can be read.
 
-import { plus } from "./view.js";
+import { cosineSeen, plus } from "./view.js";
 
 function floats(text) {
   const letters = atob(text);
@@ -10,9 +10,9 @@ function floats(text) {
 }
 
 export class PixelMap {
-  /** Rows from the top; values that are not finite are pixels without one. */
-  constructor({ columns, rows, width, height, target, right, up, values, errors }) {
-    Object.assign(this, { columns, rows, width, height, target, right, up, values, errors });
+  /** Rows from the top; values that are not finite are pixels without one; `eye`: where its own observer stands. */
+  constructor({ columns, rows, width, height, target, right, up, eye, values, errors }) {
+    Object.assign(this, { columns, rows, width, height, target, right, up, eye, values, errors });
   }
 
   static read(packed) {
@@ -34,5 +34,20 @@ export class PixelMap {
     if (!(x >= 0 && x < this.columns && y >= 0 && y < this.rows)) return { value: NaN, error: NaN, beyond: true };
     const at = y * this.columns + x;
     return { value: this.values[at], error: this.errors[at], column: x, row: y };
+  }
+
+  /** The pixels of the map itself, whatever the view shows of them, for figures of regions; places are the view's [mm]. */
+  grid(view) {
+    const { columns, rows, width, height } = this;
+    const [right, up] = this.shift(view);
+    const own = (column, row) => [(column / columns - 0.5) * width, (0.5 - row / rows) * height];
+    return {
+      columns,
+      rows,
+      steps: [width / columns, height / rows],
+      place: (column, row) => plus(own(column, row), [right, up], -1),
+      cosine: (column, row) => cosineSeen(this, ...own(column, row)),
+      read: (column, row) => ({ value: this.values[row * columns + column], error: this.errors[row * columns + column] }),
+    };
   }
 }

@@ -5,46 +5,45 @@ import { plus } from "./view.js";
 
 const SLICE = 12; // ms of work between two looks at what the user does
 const FLUX_POINTS = 256;
-const FLUX_SHIFTS = 16;
+const FLUX_PARTS = 16;
 const SECTION_POINTS = 240;
 export const REGION_SAMPLES = 4;
+const ON_THE_EDGE = 1e-9; // share of a pixel by which a middle may lie outside a region and still belong to it: rounding
 
-/** Whether a point lies within a polygon (even-odd rule). */
-export function within(corners, [x, y]) {
+/** Whether a point lies within a polygon (even-odd rule) or no farther from its edge than `slack`. */
+export function within(corners, [x, y], slack = 0) {
   let inside = false;
   for (let i = 0, j = corners.length - 1; i < corners.length; j = i++) {
     const [ax, ay] = corners[i];
-    const [bx, by] = corners[j];
-    if (ay > y !== by > y && x < ((bx - ax) * (y - ay)) / (by - ay) + ax) inside = !inside;
+    const [dx, dy] = [corners[j][0] - ax, corners[j][1] - ay];
+    const length = Math.hypot(dx, dy);
+    if (length === 0) continue;
+    const along = Math.min(Math.max(((x - ax) * dx + (y - ay) * dy) / length, 0), length) / length;
+    if (Math.hypot(x - ax - along * dx, y - ay - along * dy) <= slack) return true;
+    if (ay > y !== ay + dy > y && x < (dx * (y - ay)) / dy + ax) inside = !inside;
   }
   return inside;
 }
 
-export function areaOf(corners) {
-  let twice = 0;
-  corners.forEach(([x, y], i) => {
-    const [nx, ny] = corners[(i + 1) % corners.length];
-    twice += x * ny - nx * y;
-  });
-  return Math.abs(twice) / 2;
-}
-
-/** The pixels of a view whose middles lie within a polygon given in mm on the screen. */
-export function pixelsWithin(view, corners) {
+/** The pixels of a grid whose middles lie within a polygon given in mm on the screen: those of `etendue.PolygonRegion`. */
+export function pixelsWithin(grid, corners) {
   const found = [];
-  const step = view.width / view.columns;
-  const at = ([x, y]) => [(x + view.width / 2) / step, (view.height / 2 - y) / step];
-  const across = corners.map((c) => at(c)[0]);
-  const down = corners.map((c) => at(c)[1]);
-  const bounds = (list, most) => [Math.max(0, Math.floor(Math.min(...list))), Math.min(most, Math.ceil(Math.max(...list)))];
-  const [left, right] = bounds(across, view.columns);
-  const [top, bottom] = bounds(down, view.rows);
-  for (let row = top; row < bottom; row++) {
-    for (let column = left; column < right; column++) {
-      if (within(corners, view.place(column + 0.5, row + 0.5))) found.push([column, row]);
+  const slack = ON_THE_EDGE * Math.min(...grid.steps);
+  const { first, last } = boundsOf(grid, corners);
+  for (let row = Math.max(0, first[1]); row < Math.min(grid.rows, last[1]); row++) {
+    for (let column = Math.max(0, first[0]); column < Math.min(grid.columns, last[0]); column++) {
+      if (within(corners, grid.place(column + 0.5, row + 0.5), slack)) found.push([column, row]);
     }
   }
   return found;
+}
+
+/** Columns and rows, counted on beyond the grid, between which a polygon lies: the first ones, and those after the last. */
+function boundsOf(grid, corners) {
+  const [left, top] = grid.place(0, 0);
+  const places = corners.map(([x, y]) => [(x - left) / grid.steps[0], (top - y) / grid.steps[1]]);
+  const ends = (most, rounded) => [0, 1].map((axis) => rounded(most(...places.map((place) => place[axis]))));
+  return { first: ends(Math.min, Math.floor), last: ends(Math.max, Math.ceil) };
 }
 
 export function quantile(sorted, share) {
@@ -68,28 +67,35 @@ export async function inSlices(list, work, current) {
   return results;
 }
 
-/** The figures of a region, or null if it was given up. Values in the unit of the subject, lengths in mm. */
+/**
+ * The figures of a region, or null if it was given up. Values in the unit of the subject, lengths in mm. All of them are of the
+ * pixels whose middles lie in the region, and of no others: what reaches beyond the picture counts in none.
+ */
 export async function measureRegion(subject, view, corners, current) {
-  const pixels = pixelsWithin(view, corners);
-  const read = ([column, row]) => ({ ...subject.pixel(view, column, row, REGION_SAMPLES), column, row });
-  const all = await inSlices(pixels, read, current);
+  const grid = subject.grid(view, REGION_SAMPLES);
+  const pixels = pixelsWithin(grid, corners);
+  const all = await inSlices(pixels, ([column, row]) => grid.read(column, row), current);
   if (all === null) return null;
-  const seen = all.filter((pixel) => !pixel.beyond);
-  const dead = seen.filter((pixel) => !Number.isFinite(pixel.value)).length;
-  if (seen.length === dead) return { pixels: seen.length, dead };
+  const dead = all.filter((pixel) => !Number.isFinite(pixel.value)).length;
+  if (all.length === dead) return { pixels: all.length, dead };
   // A dead pixel, and a cell of illuminance that no ray reached, count as 0 ± 0, as in `etendue.region_statistics`: where rays
   // are few, the pixels that one of them reached are too bright on average.
-  const counted = seen.map((p) => (p.value ? p : { ...p, value: 0, error: p.error || 0 }));
-  const sorted = Float64Array.from(counted, (pixel) => pixel.value).sort();
-  const mean = sorted.reduce((sum, x) => sum + x, 0) / sorted.length;
+  const values = Float64Array.from(all, (pixel) => pixel.value || 0);
+  const errors = all.map((pixel) => (pixel.value ? pixel.error : pixel.error || 0));
+  const sum = (list) => list.reduce((total, x) => total + x, 0);
+  const mean = sum(values) / values.length;
   // Neighbours err together; so far as all of them do, the mean errs by the mean of their errors.
-  const error = counted.reduce((sum, pixel) => sum + pixel.error, 0) / counted.length;
-  const intensity = counted.reduce((sum, p) => sum + p.value * view.cosine(p.column + 0.5, p.row + 0.5), 0);
+  const error = sum(errors) / errors.length;
+  const intensity = sum(values.map((x, i) => x * grid.cosine(pixels[i][0] + 0.5, pixels[i][1] + 0.5)));
+  const pixelArea = grid.steps[0] * grid.steps[1];
+  const sorted = values.slice().sort();
   const [least, most] = [sorted[0], sorted[sorted.length - 1]];
+  const { first, last } = boundsOf(grid, corners);
   return {
-    pixels: counted.length,
+    pixels: pixels.length,
     dead,
-    area: areaOf(corners),
+    cut: first[0] < 0 || first[1] < 0 || last[0] > grid.columns || last[1] > grid.rows,
+    area: pixels.length * pixelArea,
     mean,
     error,
     minimum: least,
@@ -97,30 +103,27 @@ export async function measureRegion(subject, view, corners, current) {
     percentiles: [0.05, 0.5, 0.95].map((share) => quantile(sorted, share)),
     uniformity: mean > 0 ? least / mean : NaN,
     diversity: most > 0 ? least / most : NaN,
-    intensity: intensity * view.pixelArea * 1e-6,
-    flux: subject.parts ? fluxThrough(subject, view, corners) : null,
+    intensity: intensity * pixelArea * 1e-6,
+    flux: subject.parts ? fluxThrough(subject, view, pixels) : null,
   };
 }
 
 /**
- * Flux through the region of the screen towards the observer's side, all directions together: π · area · mean luminance over
- * places in the region and directions with density cosine/π. Lattices shifted at fixed places tell its error.
+ * Flux through pixels of the screen towards the observer's side, all directions together: π · area · mean luminance over
+ * places in the pixels and directions with density cosine/π. Parts of the lattice tell the error of the sum.
  */
-export function fluxThrough(field, view, corners) {
-  const area = areaOf(corners);
-  const [xs, ys] = [0, 1].map((axis) => corners.map((c) => c[axis]));
-  const box = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
-  const boxArea = (box[1] - box[0]) * (box[3] - box[2]);
+export function fluxThrough(field, view, pixels) {
+  const area = pixels.length * view.pixelArea;
   const golden = [0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101];
   const means = [];
   let index = 0;
-  for (let shift = 0; shift < FLUX_SHIFTS; shift++) {
+  for (let part = 0; part < FLUX_PARTS; part++) {
     let sum = 0;
     for (let i = 0; i < FLUX_POINTS; i++) {
       index += 1;
       const [a, b, c, d] = golden.map((g) => (index * g) % 1);
-      const place = [box[0] + a * (box[1] - box[0]), box[2] + b * (box[3] - box[2])];
-      if (!within(corners, place)) continue;
+      const [column, row] = pixels[Math.floor(a * pixels.length)];
+      const place = view.place(column + ((a * pixels.length) % 1), row + b);
       const radius = Math.sqrt(c);
       const [x, y] = [radius * Math.cos(2 * Math.PI * d), radius * Math.sin(2 * Math.PI * d)];
       const up = Math.sqrt(Math.max(1 - c, 0));
@@ -128,11 +131,11 @@ export function fluxThrough(field, view, corners) {
       const point = plus(plus(view.target, view.right, place[0]), view.up, place[1]);
       sum += field.luminance(point, direction).value;
     }
-    means.push((sum / FLUX_POINTS) * Math.PI * boxArea * 1e-6);
+    means.push((sum / FLUX_POINTS) * Math.PI * area * 1e-6);
   }
-  const value = means.reduce((a, b) => a + b, 0) / FLUX_SHIFTS;
-  const spread = means.reduce((a, b) => a + (b - value) ** 2, 0) / (FLUX_SHIFTS - 1);
-  return area > 0 ? { value, error: Math.sqrt(spread / FLUX_SHIFTS) } : null;
+  const value = means.reduce((a, b) => a + b, 0) / FLUX_PARTS;
+  const spread = means.reduce((a, b) => a + (b - value) ** 2, 0) / (FLUX_PARTS - 1);
+  return { value, error: Math.sqrt(spread / FLUX_PARTS) };
 }
 
 /** Values along a line on the screen from one place to another [mm]: points of equal steps, each of its own pixel's size. */

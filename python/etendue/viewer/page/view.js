@@ -22,15 +22,23 @@ function cross(a, b) {
   return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 }
 
+/** Cosine between the normal of a screen and the line from a place on it [mm] to the eye, as `etendue.Screen.cosine`. */
+export function cosineSeen({ target, right, up, eye }, u, v) {
+  const way = plus(plus(plus(eye, target, -1), right, -u), up, -v);
+  const normal = cross(right, up);
+  return Math.abs(way[0] * normal[0] + way[1] * normal[1] + way[2] * normal[2]) / Math.hypot(...way);
+}
+
 /** Sine of the angle between `up` and the line of sight below which nothing is upright, as in `etendue.Observer`. */
 const ALONG_THE_LINE = 1e-6;
 
 export class View {
   /**
-   * theta, phi [°], distance [mm], target [mm]; up, a direction or null, and roll [°]; width of the screen [mm]; columns and rows, whose pixels are square.
+   * theta, phi [°], distance [mm], target [mm]; up, a direction or null, and roll [°]; width of the screen [mm]; columns and
+   * rows, whose pixels are square; plane of the screen, "view" or "xy", in which nothing is upright but +Y.
    */
-  constructor({ theta, phi, distance, target, up = null, roll = 0, width, columns, rows }) {
-    Object.assign(this, { theta, phi, distance, target, upright: up, roll, width, columns, rows });
+  constructor({ theta, phi, distance, target, up = null, roll = 0, width, columns, rows, plane = "view" }) {
+    Object.assign(this, { theta, phi, distance, target, upright: up, roll, width, columns, rows, plane });
     const [c, s] = cosSin(phi);
     const [ct, st] = cosSin(theta);
     this.right = [ct * c * c + s * s, (ct - 1) * c * s, -st * c];
@@ -47,6 +55,7 @@ export class View {
       this.right = plus(right.map((x) => cr * x), above, sr);
       this.up = plus(above.map((x) => cr * x), right, -sr);
     }
+    if (plane === "xy") [this.right, this.up] = [[1, 0, 0], [0, 1, 0]];
     this.eye = plus(target, this.toward, distance);
   }
 
@@ -76,8 +85,7 @@ export class View {
 
   /** Cosine between the screen's normal and the line through that point: the apparent area of a pixel has it. */
   cosine(column, row) {
-    const [u, v] = this.place(column, row);
-    return this.distance / Math.hypot(u, v, this.distance);
+    return cosineSeen(this, ...this.place(column, row));
   }
 
   /** The view from another side: turned by so many degrees about its own axes, as a hand would turn the source. */
