@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
-from etendue.formats.bsdf.points import RIM, slices_of
+from etendue.formats.bsdf.points import RIM, below_zero, slices_of
 from etendue.formats.bsdf.tokens import ADVICE, ended_lines
 from etendue.formats.rays.text_rows import number, whole
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
@@ -54,8 +54,7 @@ def read(path: Path) -> BsdfData:
         for column, wavelength in channels
         for one in slices_of(angles, rows[:, column], complaints, wavelength=wavelength)
     ]
-    if (rows[:, [column for column, _ in channels]] < 0.0).any():
-        complaints.append(Complaint("warning", "values", "values below 0 became 0"))
+    complaints += below_zero(rows[:, [column for column, _ in channels]])
     turns = {round(one.phi, 4) for one in slices if one.theta > 1e-3}
     fronts = {one.front for one in slices}
     return BsdfData(

@@ -13,11 +13,10 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
-from etendue.formats.bsdf.points import slices_of
+from etendue.formats.bsdf.points import below_zero, slices_of
 from etendue.formats.bsdf.tokens import ADVICE, LARGEST
 from etendue.formats.strict_json import strict_json
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
-from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]
 
@@ -60,12 +59,10 @@ def read(path: Path) -> BsdfData:
     angles = np.column_stack([_column(path, data, name, DEGREES, values.size) for name in ANGLES])
     if (angles < 0.0).any() or (angles[:, [0, 2]] >= 90.0).any() or (angles > 360.0).any():
         raise FormatError(path, "data", "angles that are not from 0 to 90° and 0 to 360°", ADVICE)
-    if values.min() < 0.0:
-        raise FormatError(path, "data, BRDF", "a value below 0", ADVICE)
     waves = [key for key in ("wavelength_i", "wavelength_r") if key in data]
     wavelengths = _column(path, data, waves[0], NANOMETRES, values.size) if waves else None
     errors = _uncertainty(path, data, values)
-    complaints: list[Complaint] = []
+    complaints = below_zero(values)
     slices: list[BsdfSlice] = []
     for wavelength in [None] if wavelengths is None else np.unique(wavelengths).tolist():
         own = np.ones(values.size, bool) if wavelengths is None else wavelengths == wavelength
@@ -120,7 +117,7 @@ def _uncertainty(path: Path, data: dict[str, Any], values: Array) -> Array | Non
         return None
     if errors.min() < 0.0:
         raise FormatError(path, "data", "an uncertainty below 0", ADVICE)
-    return errors * values if unit == "%" else errors
+    return errors * np.abs(values) if unit == "%" else errors
 
 
 def _facts(metadata: dict[str, Any]) -> dict[str, str]:

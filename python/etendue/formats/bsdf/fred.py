@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
-from etendue.formats.bsdf.points import doubts, slice_of
+from etendue.formats.bsdf.points import below_zero, doubts, slice_of
 from etendue.formats.bsdf.tokens import ADVICE, ended_lines
 from etendue.formats.rays.text_rows import number
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
@@ -56,6 +56,7 @@ def read(path: Path) -> BsdfData:
         raise FormatError(path, f"line {len(lines)}", found, ADVICE)
     mirrored = all(0.0 <= phi - turn <= 180.0 for _, turn, points in blocks for _, phi, _ in points)
     complaints = [Complaint("note", "values", f"{gaps} directions were not measured")] if gaps else []
+    complaints += below_zero(np.array([f * scale for _, _, points in blocks for _, _, f in points]))
     slices = [one for block in blocks for one in _slices(path, block, scale, complaints, mirrored=mirrored)]
     return BsdfData(
         tuple(slices),
@@ -129,7 +130,7 @@ def _slices(path: Path, block: Block, scale: float, complaints: list[Complaint],
             continue
         polar = np.where(transmitted, 180.0 - own[:, 0], own[:, 0])
         incident = light_from(theta, (180.0 + turn) % 360.0)
-        one = slice_of(incident, polar, own[:, 1], np.maximum(own[:, 2], 0.0) * scale, transmitted)
+        one = slice_of(incident, polar, own[:, 1], own[:, 2] * scale, transmitted)
         if one is None or one.grid is None:
             raise FormatError(
                 path, f"{theta:g}° of incidence", "directions that make no grid", "Export a grid of θ and φ."

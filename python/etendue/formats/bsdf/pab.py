@@ -9,7 +9,7 @@ import numpy as np
 
 from etendue.errors import FormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat
-from etendue.formats.bsdf.points import slices_of
+from etendue.formats.bsdf.points import below_zero, slices_of
 from etendue.formats.bsdf.tokens import ADVICE, ended_lines
 from etendue.formats.rays.text_rows import number, whole
 from etendue.quantities.bsdf_data import BsdfData
@@ -62,8 +62,7 @@ def read(path: Path) -> BsdfData:
         complaints.append(Complaint("note", "values", "of X, Y, Z the second is read"))
     if quantity == "DSF":
         f = f / np.maximum(np.abs(np.cos(np.radians(table[:, 0]))), HORIZON)
-    if f.min() < 0.0:
-        complaints.append(Complaint("warning", "values", f"{(f < 0.0).sum()} values below 0 became 0"))
+    complaints += below_zero(f)
     turn = UPWARDS - _upwards(path, keys)
     around = (table[:, 1] + turn) % 360.0
     angles = np.column_stack([np.full((len(table), 2), (theta, (phi + turn) % 360.0)), table[:, 0], around])

@@ -49,7 +49,7 @@ def slices_of(
         θ and φ of the incident and of the scattered direction [°], both away from the surface; θ beyond 90° is behind it.
         Of directions that stand there several times the mean counts.
     values : array, shape (n,)
-        f [1/sr]; values below 0 become 0.
+        f [1/sr]. Values below 0 stay as they are, as noise about a dark level has them: they count in means and in shares.
     complaints : list of Complaint
         What is to be told is added to it.
     wavelength : float, optional
@@ -63,7 +63,7 @@ def slices_of(
         What was measured in the plane of incidence alone turns about the specular direction; else on a grid about the normal
         where the directions make one, else points that stand for what is nearest to them.
     """
-    angles, values, errors, several = _merged(angles, np.maximum(values, 0.0), errors)
+    angles, values, errors, several = _merged(angles, values, errors)
     told = {one.found for one in complaints}
     if several and SEVERAL not in told:
         complaints.append(Complaint("note", "data", SEVERAL))
@@ -99,6 +99,21 @@ def slices_of(
             complaints += [each for each in doubts(one) if str(each) not in map(str, complaints)]
             found.append(one)
     return found
+
+
+def below_zero(values: Array) -> list[Complaint]:
+    """What is to be told of values below 0, if there are any.
+
+    Examples
+    --------
+    >>> print(*below_zero(np.array([0.2, -0.1, 0.3])))
+    note: values: 1 of 3 below 0, down to -0.1, as noise about a dark level may be; they count in the share of the light
+    """
+    count = int((values < 0.0).sum())
+    if not count:
+        return []
+    found = f"{count} of {values.size} below 0, down to {values.min():.3g}, as noise about a dark level may be"
+    return [Complaint("note", "values", f"{found}; they count in the share of the light")]
 
 
 SEVERAL = "directions that stand there several times, as for two polarisations, became their mean"
