@@ -17,6 +17,7 @@ import pytest
 from etendue.viewer.field_tables import FieldTables
 from etendue.viewer.subjects import map_subject
 from oracles.light_fields import SURFACES, make_field
+from oracles.packaged_led import PackagedLed
 from scipy import ndimage
 
 from viewer.views import page_views
@@ -309,6 +310,42 @@ def test_all_figures_of_a_region_are_of_the_same_pixels(modules: Path) -> None:
         apparent = (screen.cosine(observer) * screen.pixel_area * 1e-6)[inside].sum()
         assert figures["intensity"] == pytest.approx(level * apparent, rel=1e-9)
     assert [figures["cut"] for figures in found] == [False, True]
+
+
+@pytest.mark.slow
+def test_the_error_of_a_flux_is_that_of_the_rays(modules: Path) -> None:
+    """Of fields of 20 000 rays of an LED, whose flux through a plane is known by quadrature, in regions large and small.
+
+    The root mean square of z is below 1.3, of 5 fields and 4 regions, whose light is partly the same: of 10 independent
+    ones it would be 1.7 by 10⁻³. The error is not many times too large either: it is the counting error, which a field
+    undercuts where it smooths, here by up to some six times.
+    """
+    led, z, cells = PackagedLed(), -0.2368, 40
+    around = et.Plane(
+        z=z, width=2.8, height=2.5, centre=(0.2, -0.12), focus=(-0.272, 0.196, 0.15, -0.073), frames=2, rest=11
+    )
+    truth = led.exitance(z=z, side=led.side, cells=cells, directions=16)
+    # In columns from the left and rows from below.
+    boxes = {"half": (6, 33, 5, 34), "part": (10, 17, 12, 21), "beside": (1, 4, 1, 30), "small": (24, 27, 21, 23)}
+    step = led.side / cells
+    regions = []
+    for left, right, bottom, top in boxes.values():
+        xs, ys = ([end * step - led.side / 2 for end in ends] for ends in ((left, right), (bottom, top)))
+        regions.append([(xs[0], ys[0]), (xs[1], ys[0]), (xs[1], ys[1]), (xs[0], ys[1])])
+    view = {"theta": 0, "phi": 0, "distance": 500, "target": [*led.centre, z], "width": led.side}
+    scores = []
+    for seed in range(1, 6):
+        position, direction = led.rays(20_000, seed=seed)
+        rays = et.RaySet(position, direction, np.full(len(position), led.total_flux / len(position)))
+        packed = FieldTables.of(et.LightField.fit(rays, around, depths=(4, 4, 3, 3), seed=seed)).packed()
+        data = {"field": packed, "view": view, "columns": cells, "rows": cells, "regions": regions}
+        for (left, right, bottom, top), one in zip(boxes.values(), run(modules, REGIONS_OF_FIELD, data), strict=True):
+            assert one["pixels"] == (right - left) * (top - bottom)
+            flux = truth[bottom:top, left:right].sum()
+            scores.append((one["flux"]["value"] - flux) / one["flux"]["error"])
+    z_scores = np.array(scores).reshape(-1, len(boxes))
+    assert np.sqrt((z_scores**2).mean()) < 1.3
+    assert np.sqrt((z_scores**2).mean(axis=0)).min() > 0.1
 
 
 NUMBERS = """

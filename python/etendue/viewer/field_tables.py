@@ -161,6 +161,8 @@ class FieldTables:
     parts : tuple of PartTables
     step, error_step : float
         Of the logarithms of the ratios and of the errors.
+    ray_flux : float
+        Of each of as many equal rays as the field rests on [flux unit]; NaN if that is not known.
 
     Examples
     --------
@@ -177,12 +179,17 @@ class FieldTables:
     parts: tuple[PartTables, ...]
     step: float
     error_step: float
+    ray_flux: float
 
     @classmethod
     def of(cls, field: EtendueDensity, step: float = STEPS[0][0], error_step: float = STEPS[0][1]) -> Self:
         """The tables of a field, whose ratios are kept in steps of `step`."""
         pairs = zip(field.surface.parts(), field.parts, strict=True)
-        return cls(tuple(PartTables.of(chart, part, step, error_step) for chart, part in pairs), step, error_step)
+        parts = tuple(PartTables.of(chart, part, step, error_step) for chart, part in pairs)
+        report = field.report
+        # Not of the images that a symmetry gives: they tell nothing new of a region that lies over them.
+        rests = report.effective_rays if math.isfinite(report.effective_rays) else float(report.rays - report.unmet_rays)
+        return cls(parts, step, error_step, field.total_flux / rests if rests > 0.0 else math.nan)
 
     @classmethod
     def within(cls, field: EtendueDensity, most_bytes: int) -> tuple[Self, dict[str, Any]]:
@@ -204,7 +211,8 @@ class FieldTables:
 
     def packed(self) -> dict[str, Any]:
         """For the page."""
-        return {"parts": [part.packed() for part in self.parts], "bound": self.bound}
+        ray_flux = None if math.isnan(self.ray_flux) else self.ray_flux
+        return {"parts": [part.packed() for part in self.parts], "bound": self.bound, "ray_flux": ray_flux}
 
     def luminance(self, points: npt.ArrayLike, directions: npt.ArrayLike) -> FloatArray:
         """What the page reads along lines, by the core [cd/m² or W/(m² sr)], shape (n,)."""

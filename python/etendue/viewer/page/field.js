@@ -108,8 +108,9 @@ function readPart(part, [s1, s2, a, b]) {
 }
 
 export class Field {
-  constructor(parts) {
-    this.parts = parts;
+  /** `rayFlux`: of each of as many equal rays as the field rests on; NaN if that is not known. */
+  constructor(parts, rayFlux) {
+    Object.assign(this, { parts, rayFlux });
   }
 
   /** From what the page holds. */
@@ -127,7 +128,7 @@ export class Field {
       spaceError: await table(part.space_error, 0),
       directionError: await table(part.direction_error, 0),
     }));
-    return new Field(await Promise.all(parts));
+    return new Field(await Promise.all(parts), packed.ray_flux ?? NaN);
   }
 
   /** Luminance along one line and its standard error. */

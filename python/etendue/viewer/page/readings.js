@@ -110,7 +110,9 @@ export async function measureRegion(subject, view, corners, current) {
 
 /**
  * Flux through pixels of the screen towards the observer's side, all directions together: π · area · mean luminance over
- * places in the pixels and directions with density cosine/π. Parts of the lattice tell the error of the sum.
+ * places in the pixels and directions with density cosine/π. The error is that of counting those of the rays that the field
+ * rests on, √(flux · flux of a ray) as in `LightField.intensity`, which the field mostly undercuts as it smooths; and that of
+ * the sum, of which parts of the lattice tell.
  */
 export function fluxThrough(field, view, pixels) {
   const area = pixels.length * view.pixelArea;
@@ -135,7 +137,7 @@ export function fluxThrough(field, view, pixels) {
   }
   const value = means.reduce((a, b) => a + b, 0) / FLUX_PARTS;
   const spread = means.reduce((a, b) => a + (b - value) ** 2, 0) / (FLUX_PARTS - 1);
-  return { value, error: Math.sqrt(spread / FLUX_PARTS) };
+  return { value, error: Math.hypot(Math.sqrt(value * field.rayFlux), Math.sqrt(spread / FLUX_PARTS)) };
 }
 
 /** Values along a line on the screen from one place to another [mm]: points of equal steps, each of its own pixel's size. */
