@@ -81,7 +81,8 @@ def test_help_imports_no_verb() -> None:
     parts = {name.split(".")[1] for name in ours(modules) if "." in name}
     assert parts == {"cli", "errors", "extras", "formats", "quantities"}
     commands = {name for name in ours(modules) if name.startswith("etendue.cli.")}
-    assert commands == {f"etendue.cli.{name}" for name in ("app", "guard", "stopping", "terminal", "verbs", "wording")}
+    names = ("app", "guard", "stated", "stopping", "terminal", "verbs", "wording")
+    assert commands == {f"etendue.cli.{name}" for name in names}
 
 
 @pytest.mark.slow

@@ -63,7 +63,7 @@ def test_mistakes_are_told_and_nothing_is_written(run: Run) -> None:
         (("-o", "lamp.ray"), "--format"),
         (("-o", "out/lamp.ies"), "does not exist"),
         (("--positions", "7"), "whole number of steps"),
-        (("--surface", "sphare"), "sphere"),
+        (("--surface", "sphare", "-o", "lamp.tm25ray"), "sphere"),
         (("--centre", "0,0"), "3 numbers"),
         (("--bits", "24"), "bits"),
         (("--seed", "-1"), "--seed"),

@@ -50,7 +50,7 @@ def test_counts_have_letters(run: Run, lamp: Path) -> None:
 
 
 def test_the_case_of_a_choice_does_not_matter(run: Run, lamp: Path) -> None:
-    mapped(run, lamp, "--observer", "0,0", "--size", "20,20", "--scale", "Log")
+    mapped(run, lamp, "--observer", "0,0", "--size", "20,20", "--scale", "Log", "-o", "map.svg")
     usual = mapped(run, lamp, "--observer", "30,0", "--size", "20,20", "--plane", "xy")
     base = ("--observer", "30,0", "--size", "20,20", "--acceptance", "5", "-o", "map.npz", "--json")
     loose = run("luminance", lamp, *base, "--plane", "XY", "--method", "Cone")

@@ -297,7 +297,7 @@ def test_luminance_of_collected_rays(run: Run, traced: et.TraceResult, tmp_path:
     [
         (["r.h5", *VIEW], 1, "3 detectors keep what can be looked at (scatter, few, rcs)"),
         (["r.h5", *VIEW, "--detector", "sctter"], 1, "Did you mean 'scatter'"),
-        (["r.h5", *VIEW, "--detector", "far"], 1, "unknown detector"),
+        (["r.h5", *VIEW, "--detector", "far"], 1, "far: it is of the kind intensity"),
         (["r.h5", *VIEW, "--detector", "scatter", "--acceptance", "3"], 2, "--acceptance"),
         (["r.h5", *VIEW, "--detector", "scatter", "--flux", "3"], 2, "--flux"),
         (["r.h5", *VIEW, "--detector", "scatter", "--until", "0.1"], 2, "give --rays-per-pixel too"),

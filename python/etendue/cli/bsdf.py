@@ -11,9 +11,12 @@ import numpy as np
 import typer
 
 from etendue.cli.guard import guarded
+from etendue.cli.stated import Verb, refuse, stated
 from etendue.cli.terminal import check_folder, complain, one_of, print_json, say
 from etendue.errors import ArgumentError
 from etendue.formats.bsdf import BSDF_FORMATS
+from etendue.formats.rt300s import is_rt300s
+from etendue.formats.scans_csv import DIRECTIONS, STAGES, read_columns
 from etendue.plot import plot_bsdf
 from etendue.quantities.bsdf_data import BsdfSlice
 from etendue.quantities.measured import measured
@@ -242,6 +245,7 @@ def fit(
     if chosen is not None and fitted is not None:
         raise typer.BadParameter("it is for tables, and --model asks for a model; leave one out", param_hint="--method")
     check_folder(output)
+    _refuse_idle(files)
     scans = read_scans(
         files,
         incident_flux=incident_flux,
@@ -255,6 +259,20 @@ def fit(
     else:
         named = ", ".join(file.name for file in files)
         _fit_table(scans, named, chosen or AUTOMATIC, output, json=json)
+
+
+def _refuse_idle(files: list[Path]) -> None:
+    """Refuse options that are for other kinds of scans than these."""
+    of_stages = ("incident_flux", "solid_angle")
+    if not stated("blank", *of_stages):
+        return
+    books = [file for file in files if is_rt300s(file)]
+    if not books:
+        refuse(["blank"], "for .xls of the RT-300S, and none of the files is one")
+    # Files of stages are told from those of directions by their columns.
+    tables = (read_columns(file, (DIRECTIONS, STAGES)) for file in files if file not in books)
+    if all(DIRECTIONS[0] in columns for columns in tables):
+        refuse(of_stages, "for scans of stages and fluxes, and none of the files is one")
 
 
 def _fit_model(scans: Scans, model: str, output: Path, *, json: bool) -> None:
@@ -356,4 +374,4 @@ for _name, _verb in (
     ("fit", fit),
     ("materials", materials),
 ):
-    app.command(_name)(guarded(f"bsdf {_name}", _verb))
+    app.command(_name, cls=Verb)(guarded(f"bsdf {_name}", _verb))

@@ -9,6 +9,7 @@ from typing import Annotated, TypeVar
 import typer
 
 from etendue.cli.options import ray_format
+from etendue.cli.stated import refuse
 from etendue.cli.terminal import check_folder, complain, count, one_of, print_json, progress_bar, say
 from etendue.formats.rays import read_rays, write_rays
 from etendue.lightfield.light_field import LightField
@@ -48,6 +49,8 @@ def convert(
     if format is not None:
         ray_format(format)
     check_folder(output)
+    if subset is None:
+        refuse(["seed"], "for --subset, which draws rays; without it all are written as they are")
     if flux and len(flux) != len(inputs):
         raise typer.BadParameter(f"--flux was given {len(flux)} times for {len(inputs)} input files")
     fluxes: list[str | None] = [*flux] if flux else [None] * len(inputs)

@@ -9,6 +9,7 @@ from typing import Annotated, Any, get_args
 import numpy as np
 import typer
 
+from etendue.cli.stated import refuse
 from etendue.cli.terminal import check_outputs, complain, half_width, one_of, print_json, say
 from etendue.errors import ArgumentError
 from etendue.instruments.bench import Bench
@@ -122,6 +123,10 @@ def deconvolve(
     if method not in {None, *get_args(DirectionalMethod)}:
         raise ArgumentError(f"--method {method} is for scans in one plane; {scan} is in two dimensions")
     way: Any = method or "richardson-lucy"
+    if way != "parametric":
+        refuse(["models"], f"for --method parametric; {way} chooses from none")
+    if way in {"parametric", "matrix"}:
+        refuse(["stop", "replicates"], f"for an iteration; --method {way} is none")
     more: dict[str, Any] = {} if chosen is None else {"models": chosen}
     found = deconvolve_directions(
         measured,
@@ -152,7 +157,11 @@ def _instrument(
 ) -> Bench | GoniometerScan | None:
     stated = (beam, aperture, distance)
     if all(value is None for value in stated):
-        return bare if scan.bench is None else None
+        if scan.bench is not None:
+            refuse(
+                ["instrument"], "the file of the scan tells beam, aperture and distance, which say more; leave it out"
+            )
+        return bare
     if bare is not None:
         raise ArgumentError("state --aperture, --beam and --distance, or --instrument: not both")
     if any(value is None for value in stated):

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from etendue.cli.stated import refuse_without_picture
 from etendue.cli.terminal import check_outputs, complain, numbers, print_json, say
 from etendue.formats.maps import PICTURE_EXTENSIONS
 from etendue.plot.scene_layout import DEFAULT_SECTIONS, SceneLayout, lay_out_scene
@@ -45,6 +46,7 @@ def draw(
 ) -> None:
     """Draw sections of a scene to scale, with a few rays; say how large it is and what stands in it."""
     outputs = output or []
+    refuse_without_picture(outputs, "title")
     check_outputs(outputs, PICTURE_EXTENSIONS)
     frame = None if window is None else numbers(window, 4, "--window", "-20,20,0,40")
     layout = lay_out_scene(Scene.load(file), section or DEFAULT_SECTIONS, rays=rays, seed=seed, window=frame)

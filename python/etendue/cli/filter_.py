@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from etendue.cli.luminance import print_map, summary, write_map
+from etendue.cli.maps import print_map, summary, write_map
+from etendue.cli.stated import refuse, refuse_without_picture
 from etendue.cli.terminal import check_outputs, complain, one_of, print_json, say
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS, read_map
 from etendue.luminance.denoising import denoise_map
@@ -34,6 +35,11 @@ def filter_(
     """Smooth a map: opt needs no setting and keeps the flux; the four filters of the thesis report what they lose."""
     kind = one_of(kind, KINDS, "--kind")
     colours = one_of(scale, SCALES, "--scale")
+    if kind == "opt":
+        refuse(["size", "gamma"], f"for {', '.join(FILTERS)}; opt needs no setting. Leave it out")
+    elif not FILTERS[kind].selective:
+        refuse(["gamma"], f"for the selective filters, and {kind} is none; leave it out")
+    refuse_without_picture(output, "scale")
     check_outputs(output, (*MAP_EXTENSIONS, *PICTURE_EXTENSIONS))
     noisy = read_map(file)
     smooth = denoise_map(noisy) if kind == "opt" else filter_map(noisy, kind, size=size, gamma=gamma)

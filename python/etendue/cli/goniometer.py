@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from etendue.cli.stated import refuse
 from etendue.cli.terminal import check_folder, complain, count, half_width, one_of, print_json, say
 from etendue.instruments.directional_scan import DirectionalScan
 from etendue.instruments.goniometer_scan import Way
@@ -111,11 +112,17 @@ def goniometer(
         raise typer.BadParameter("--window needs a sample: the bare beam is the same across and along")
     if not window and (outside is not None or turn or head):
         raise typer.BadParameter("--outside, --turn and --head are for scans in two dimensions: add --window")
+    if no_sample:
+        refuse(("incidence", "plane", "way"), "for a sample; the bare beam goes straight on")
+        if not fresh:
+            refuse(["rays"], "of the bare beam, for --fresh; without it the overlap of beam and aperture is computed")
     step = step if step is not None else BARE_STEP if no_sample else STEP
     which: Plane = one_of(plane, ("in-plane", "cross-plane"), "--plane")
     if window and which != "in-plane":
         raise typer.BadParameter("--plane is for scans in one plane; --window scans both")
     how: Method = one_of(method, ("trace", "quadrature"), "--method")
+    if how == "quadrature":
+        refuse(("rays", "fresh"), "for --method trace; a quadrature draws no rays")
     shape: Literal["uniform", "gaussian"] = one_of(profile, ("uniform", "gaussian"), "--profile")
     ways: tuple[Way, Way] = ("transmitted", "reflected")
     to = None if way is None else one_of(way, ways, "--way")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from etendue.cli.options import Json, Threads, ray_format
+from etendue.cli.stated import refuse
 from etendue.cli.terminal import check_folder, complain, count, numbers, print_json, progress_bar, say
 from etendue.errors import ArgumentError
 from etendue.formats.intensity import INTENSITY_EXTENSIONS, write_intensity
@@ -23,6 +23,13 @@ from etendue.quantities.measured import measured
 
 RUN_EXTENSIONS = (".h5", ".hdf5")
 CLOSEST = "closest"
+
+SETTINGS = (
+    "positions", "distance", "photometer_distance", "centre", "field_of_view", "camera_pixels", "exposures",
+    "exposure_ratio", "level", "bits", "full_well", "read_noise", "threshold", "blur", "exposure_error",
+    "photometer_error", "arm_error", "misalignment", "samples",
+)  # fmt: skip
+"""Options that say how a lamp is measured."""
 
 
 def goniophotometer(
@@ -123,6 +130,10 @@ def goniophotometer(
         ray_format(format)
     for path in outputs:
         _check(path, format)
+    if all(_kind(path, format) != "rays" for path in outputs):
+        refuse(("rays", "format", "surface"), "for ray files, and none is written; add one, e.g. -o lamp.tm25ray")
+    if exposures == 1:
+        refuse(["exposure_ratio"], "for --exposures 2 or more, of which each is longer than the one before")
     at = CLOSEST if surface == CLOSEST else parse_surface(surface)
     gonio = NearFieldGoniophotometer(
         _steps(positions),
@@ -146,7 +157,7 @@ def goniophotometer(
     )
     run = _measured_before(lamp)
     if run is not None:
-        _refuse_settings(lamp, gonio, samples)
+        refuse(SETTINGS, f"{lamp} was measured before; such settings are for a lamp that is measured")
     else:
         with progress_bar("positions", len(gonio.positions)) as progress:
             told = None if progress is None else lambda done, _: progress(done)
@@ -201,19 +212,6 @@ def _check(path: Path, format: str | None) -> None:
             "--format for rays in a file of another name."
         )
     check_folder(path)
-
-
-def _refuse_settings(lamp: Path, gonio: NearFieldGoniophotometer, samples: int | None) -> None:
-    """Settings of the instrument change nothing of what was measured before."""
-    standard = NearFieldGoniophotometer()
-    names = [field.name for field in dataclasses.fields(gonio)]
-    stated = [name for name in names if getattr(gonio, name) != getattr(standard, name)]
-    stated += [] if samples is None else ["samples"]
-    if stated:
-        options = ", ".join("--positions" if name == "step" else f"--{name.replace('_', '-')}" for name in stated)
-        raise typer.BadParameter(
-            f"{options}: {lamp} was measured before; such settings are for a lamp that is measured"
-        )
 
 
 def _measured_before(path: Path) -> NearFieldRun | None:

@@ -11,6 +11,7 @@ import typer
 from etendue.cli.distributions import describe_intensity, print_intensity
 from etendue.cli.field import complaints_of, read_source
 from etendue.cli.options import Flux, Json, Unit
+from etendue.cli.stated import refuse_without_picture
 from etendue.cli.terminal import check_outputs, complain, one_of, print_json, progress_bar, say
 from etendue.errors import UnsupportedFormatError
 from etendue.formats.intensity import (
@@ -72,6 +73,7 @@ def intensity(
     """Far-field intensity of rays, a light field, patches or an intensity file: in figures, as a file, as a picture."""
     outputs = output or []
     shape = one_of(kind, INTENSITY_KINDS, "--kind")
+    refuse_without_picture(outputs, "kind", "per_klm")
     check_outputs(outputs, (*INTENSITY_EXTENSIONS, *PICTURE_EXTENSIONS))
     if is_patch_folder(file):
         _refuse(file, "ray and intensity files", {"--photometry": photometry, "--flux": flux, "--unit": unit})

@@ -7,15 +7,17 @@ import re
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import numpy as np
 import typer
 
 from etendue.cli.convert import in_unit, with_flux
+from etendue.cli.detectors import check_detector
 from etendue.cli.field import complaints_of, read_source, surface_option
+from etendue.cli.maps import check_regions, parsed_regions, print_map, summary, write_map
 from etendue.cli.options import Flux, Json, Regions, Threads, Unit
 from etendue.cli.orbit import alike, around, moving_outputs
+from etendue.cli.stated import refuse, refuse_without_picture
 from etendue.cli.terminal import (
     angles,
     both_sides,
@@ -34,7 +36,6 @@ from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.formats.patch_folder import is_patch_folder
 from etendue.lightfield.light_field import LightField
 from etendue.luminance.estimate import Acceptance, luminance_map
-from etendue.luminance.filters import pixels_err_together
 from etendue.luminance.framing import centre_of_light, framed_screens, probe
 from etendue.luminance.methods import (
     METHOD_NAMES,
@@ -46,14 +47,11 @@ from etendue.luminance.methods import (
     mismatch,
 )
 from etendue.luminance.opening import SCENE_EXTENSION, open_source
-from etendue.luminance.regions import AnyRegion, parse_region, region_statistics
+from etendue.luminance.regions import AnyRegion
 from etendue.plot.animation import plot_animation
-from etendue.plot.colour_scale import SCALES, Scale
-from etendue.plot.map_picture import plot_map
+from etendue.plot.colour_scale import SCALES
 from etendue.quantities.luminance_map import LuminanceMap
-from etendue.quantities.measured import measured
 from etendue.quantities.observer import PLANES, Observer, Screen
-from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress
 from etendue.scene import Scene
@@ -222,7 +220,8 @@ def luminance(
 ) -> None:
     """Luminance maps with a standard error per pixel, from rays, a light field, a scene or a trace, for many observers."""
     method, plane = one_of(method, METHOD_NAMES, "--method"), one_of(plane, PLANES, "--plane")
-    colours = one_of(scale, SCALES, "--scale")
+    colours, regions = one_of(scale, SCALES, "--scale"), parsed_regions(region, output)
+    refuse_without_picture(output, "scale")
     stated = {
         "acceptance": None if acceptance is None else _acceptance(acceptance),
         "observer_radius": observer_radius,
@@ -237,19 +236,13 @@ def luminance(
     is_scene = file.suffix.lower() == SCENE_EXTENSION or is_patch_folder(file)
     scene = opened if is_scene and isinstance(opened := open_source(file), Scene) else None
     detected = _detected(file, detector)
-    regions = [parse_region(text) for text in region or []]
     looked = detected if isinstance(detected, ScatterEvents) else scene
     own = looked.scene if isinstance(looked, ScatterEvents) else scene
     own_observers = own is not None and observer is None and size is None and orbit is None
     if own is not None and own_observers:
         who = _observers_of(own, file)
-        view = {
-            "--distance": (distance, DISTANCE),
-            "--target": (target, None),
-            "--up": (up, None),
-            "--roll": (roll, 0.0),
-        }
-        _refuse_view(view | {"--pixels": (pixels, PIXELS), "--plane": (plane, "view")}, file)
+        why = f"for an observer that is stated with --observer; those of {file} have their own"
+        refuse(("distance", "target", "up", "roll", "pixels", "plane"), why)
     else:
         upright = None if up is None else _three(up, "--up", "0,0,1")
         who = [("", Observer(theta, phi, distance, up=upright, roll=roll)) for theta, phi in angles(observer)]
@@ -273,6 +266,7 @@ def luminance(
         framed = source if isinstance(source, RaySet | LightField) else own
         observers, screens = _views(framed, observers, target, size, pixels, plane)
         screens = screens if orbit is None else alike(screens)
+    check_regions(regions, screens)
     with _progress(source, screens, how) as progress:
         maps = luminance_map(
             source,
@@ -317,7 +311,7 @@ def _detected(file: Path, detector: str | None) -> ScatterEvents | RaySet | None
 
     Raises
     ------
-    ArgumentError
+    UnknownNameError, ArgumentError
         If there is no such detector, or several and none is named.
     """
     # A file that is missing is told when it is read.
@@ -326,15 +320,16 @@ def _detected(file: Path, detector: str | None) -> ScatterEvents | RaySet | None
         return None
     result = TraceResult.load(file)
     found: dict[str, ScatterEvents | RaySet] = {**result.events, **result.rays}
-    if detector is not None and detector not in found:
-        raise UnknownNameError("detector of scatter events or rays", detector, found)
-    if detector is None and len(found) != 1:
+    if detector is not None:
+        check_detector(result, detector, found, "scatter events or rays")
+        return found[detector]
+    if len(found) != 1:
         have = (
             f"{len(found)} detectors keep what can be looked at ({', '.join(found)})" if found else "no detector keeps"
         )
         wish = "name one by --detector" if found else "scatter events or rays: add one of the kind scatter or rays"
         raise ArgumentError(f"{file}: {have}{'; ' if found else ' '}{wish}.")
-    return found[detector] if detector is not None else next(iter(found.values()))
+    return next(iter(found.values()))
 
 
 def _method(source: Source, method: str, options: Mapping[str, object]) -> AnyMethod | None:
@@ -423,12 +418,6 @@ def _observers_of(scene: Scene, file: Path) -> list[tuple[str, Observer]]:
     return [(keys.name, keys.observer()) for keys in scene.observers]
 
 
-def _refuse_view(options: Mapping[str, tuple[object, object]], file: Path) -> None:
-    """Refuse what says how to look, option by option beside its default, where the observers of a scene look."""
-    changed = {name: value for name, (value, default) in options.items() if value != default}
-    _refuse(changed, f"for an observer that is stated with --observer; those of {file} have their own")
-
-
 def _refuse(options: Mapping[str, object], why: str) -> None:
     needless = [option for option, value in options.items() if value is not None]
     if needless:
@@ -438,19 +427,6 @@ def _refuse(options: Mapping[str, object], why: str) -> None:
 def _acceptance(text: str) -> Acceptance:
     """The half-angle that an option states, or "auto"."""
     return "auto" if text.strip() == "auto" else numbers(text, 1, "--acceptance", "1.5, or --acceptance auto")[0]
-
-
-def write_map(
-    lmap: LuminanceMap, paths: list[Path], scale: Scale = "auto", regions: Sequence[AnyRegion] = ()
-) -> list[str]:
-    """Write a map to files, or draw it, by extension; returns what the formats could not express."""
-    notes: list[str] = []
-    for path in paths:
-        if path.suffix.lower() in PICTURE_EXTENSIONS:
-            plot_map(lmap, path, scale, regions=regions)
-        else:
-            notes.extend(f"{path}: {note}" for note in lmap.save(path))
-    return notes
 
 
 def _named(path: Path, observer: Observer, name: str) -> Path:
@@ -464,53 +440,3 @@ def _named(path: Path, observer: Observer, name: str) -> Path:
         return angles[match[1]]
 
     return Path(re.sub(r"\{(\w*)\}", value, str(path)))
-
-
-def summary(lmap: LuminanceMap, regions: Sequence[AnyRegion] = ()) -> dict[str, Any]:
-    """A map in figures, as plain data [unit of the map]."""
-    live = ~np.isnan(lmap.values)
-    values = lmap.values[live]
-    error = lmap.relative_error
-    return {
-        "quantity": lmap.quantity,
-        "unit": lmap.unit,
-        "observer": lmap.header()["observer"],
-        "screen": lmap.header()["screen"],
-        "mean_of_live_pixels": float(values.mean()) if live.any() else None,
-        "maximum": float(values.max()) if live.any() else None,
-        "intensity": lmap.intensity,
-        "relative_error": None if error is None else dataclasses.asdict(error),
-        "rays": int(lmap.rays[lmap.rays > 0].sum()) if (lmap.rays >= 0).any() else None,
-        "dead_pixels": lmap.dead_pixels,
-        "pixels": lmap.values.size,
-        "regions": [region_statistics(lmap, region).to_dict() for region in regions],
-        "notes": list(lmap.notes),
-    }
-
-
-def print_map(lmap: LuminanceMap, regions: Sequence[AnyRegion] = (), *, notes: bool = True) -> None:
-    """A map in figures, for people, with its notes or without."""
-    facts = summary(lmap)
-    where = lmap.observer
-    say(f"{facts['quantity']} from θ = {where.theta:g}°, φ = {where.phi:g}°, {where.distance:g} mm")
-    if facts["maximum"] is not None:
-        error = lmap.standard_error.flat[np.nanargmax(lmap.values)]
-        say(
-            f"  mean of live pixels {counted(facts['mean_of_live_pixels'], lmap.unit)}, "
-            f"maximum {measured(facts['maximum'], error, lmap.unit)}"
-        )
-        unit = "cd" if lmap.flux_unit == "lm" else "W/sr"
-        say(f"  intensity towards the observer {counted(facts['intensity'], unit)}")
-    if lmap.relative_error is not None:
-        say(f"  {lmap.relative_error.sentence(facts['quantity'])}")
-    for number, region in enumerate(regions, 1):
-        found = region_statistics(lmap, region)
-        mean_error = found.mean_error if pixels_err_together(lmap) else found.mean_error_apart
-        say(
-            f"  region {number}: mean {measured(found.mean, mean_error, found.unit)}, "
-            f"minimum {counted(found.minimum, found.unit)}, maximum {counted(found.maximum, found.unit)}, "
-            f"minimum over mean {found.uniformity:.3g}"
-            + (f"; {found.dead_pixels} of {found.pixels} pixels are dead and count as 0" if found.dead_pixels else "")
-        )
-    for note in lmap.notes if notes else ():
-        say(f"  {note}")

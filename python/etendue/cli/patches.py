@@ -9,6 +9,7 @@ import typer
 
 from etendue.cli.convert import in_unit, with_flux
 from etendue.cli.options import Flux, Json, Unit
+from etendue.cli.stated import refuse
 from etendue.cli.terminal import complain, one_of, print_json, progress_bar, say, whole_numbers
 from etendue.formats.output import atomic_output
 from etendue.formats.patch_folder import PATCH_FORMATS, check_patch_folder
@@ -69,6 +70,8 @@ def patches(
     first = whole_numbers(coarsest, 2, "--coarsest", "30,90")
     last = whole_numbers(finest, 2, "--finest", "1,1")
     scenes = [one_of(name, SCENES, "--scene") for name in scene or []]
+    if not sweep:
+        refuse(["seed"], "for --sweep, which keeps rays back; without it none is drawn")
     carrier = parse_surface(surface)
     rays = in_unit(with_flux(read_rays(file), flux), unit)
     check_patch_folder(output, rays.flux_unit, lids, scenes)

@@ -9,13 +9,15 @@ from typing import Annotated, get_args
 import numpy as np
 import typer
 
-from etendue.cli.luminance import print_map
+from etendue.cli.maps import check_regions, parsed_regions, print_illuminance, print_map
 from etendue.cli.options import Json, Regions
+from etendue.cli.stated import refuse, stated
 from etendue.cli.terminal import check_outputs, complain, one_of, print_json, say
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.intensity import detect_intensity_format, read_intensity
 from etendue.formats.maps import read_any_map
-from etendue.luminance.regions import AnyRegion, parse_region, region_statistics
+from etendue.luminance.region_statistics import region_statistics
+from etendue.luminance.regions import AnyRegion
 from etendue.plot.colour_scale import SCALES, Scale, choose_scale, normalisation
 from etendue.plot.intensity_picture import plot_intensity
 from etendue.plot.map_picture import Show, plot_map
@@ -48,9 +50,11 @@ def plot(
     json: Json = False,
 ) -> None:
     """Draw maps, or intensity distributions, that are in files; say what regions of a map amount to."""
-    colours: Scale = "log" if log else one_of(scale, SCALES, "--scale")
+    colours = one_of(scale, SCALES, "--scale")
+    if log:
+        colours = _logarithmic(colours)
     shown = one_of(show, get_args(Show), "--show")
-    regions = [parse_region(text) for text in region or []]
+    regions = parsed_regions(region, output)
     targets = [[_named(path, file) for path in output] for file in files]
     everything = [path for paths in targets for path in paths]
     if len(set(everything)) < len(everything):
@@ -59,12 +63,11 @@ def plot(
     found = [_read(file) for file in files]
     maps = [one for one in found if isinstance(one, LuminanceMap | IlluminanceMap)]
     if len(maps) < len(found):
-        given = {"--log": log, "--vmin": vmin is not None, "--vmax": vmax is not None, "--region": bool(regions)}
-        wrong = ", ".join(name for name, is_given in given.items() if is_given)
-        if wrong:
-            raise typer.BadParameter(f"{wrong}: for maps; an intensity distribution has no colours and no regions")
-    elif per_klm and len(maps) == len(found):
-        raise typer.BadParameter("--per-klm: for intensity distributions; a map is in cd/m²")
+        for_maps = ("scale", "log", "vmin", "vmax", "show", "region")
+        refuse(for_maps, "for maps; an intensity distribution has no colours and no regions")
+    elif per_klm:
+        raise typer.BadParameter("--per-klm: for intensity distributions; a map is in cd/m² or lx")
+    check_regions(regions, [one.screen for one in maps])
     if len(maps) > 1 and shown == "value":
         colours, vmin, vmax = _common(maps, colours, vmin, vmax)
     for one, paths in zip(found, targets, strict=True):
@@ -79,12 +82,29 @@ def plot(
     for file, one, paths in zip(files, found, targets, strict=True):
         if isinstance(one, LuminanceMap):
             print_map(one, regions)
+        elif isinstance(one, IlluminanceMap):
+            print_illuminance(one, regions)
         else:
             say(f"{file}")
-            for note in one.notes if isinstance(one, IlluminanceMap) else map(str, one.complaints):
-                complain(f"note: {note}")
+            for complaint in one.complaints:
+                complain(f"note: {complaint}")
         for path in paths:
             say(f"  {path}")
+
+
+def _logarithmic(stated_scale: Scale) -> Scale:
+    """The scale that ``--log`` asks for.
+
+    Raises
+    ------
+    typer.BadParameter
+        If ``--scale`` asks for another one.
+    """
+    if stated("scale") and stated_scale != "log":
+        raise typer.BadParameter(
+            f"--log is --scale log, and --scale {stated_scale} asks for another one; leave one out"
+        )
+    return "log"
 
 
 def _facts(file: Path, one: Map | Intensity, paths: list[Path], *, regions: list[AnyRegion]) -> dict[str, object]:

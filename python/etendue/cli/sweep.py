@@ -10,6 +10,7 @@ import typer
 
 from etendue.cli.guard import require_apart
 from etendue.cli.options import Json, Threads
+from etendue.cli.stated import refuse
 from etendue.cli.terminal import (
     INTERRUPTED,
     angles,
@@ -111,15 +112,17 @@ def sweep(
 ) -> None:
     """Measure a scene over one of its numbers, or over a grid of several: a table, a picture. Ctrl-C keeps what was done."""
     outputs = output or []
+    names = [name.strip() for text in measure for name in text.split(",") if name.strip()]
+    _refuse_idle(names, stated_observer=bool(observer))
     check_outputs(outputs, (*EXTENSIONS, *PICTURE_EXTENSIONS))
     scene = Scene.load(file)
     require_apart([file, *scene.read_files()], outputs)
     steps = sweep_steps(
         scene,
         _settings(setting),
-        [name.strip() for text in measure for name in text.split(",") if name.strip()],
+        names,
         _observers(observer, distance, target),
-        _screen(size, pixels, stated=bool(observer)),
+        _screen(size, pixels) if observer else None,
         region=None if region is None else parse_region(region),
         rays=rays,
         rays_per_pixel=rays_per_pixel,
@@ -156,6 +159,19 @@ def sweep(
         raise typer.Exit(INTERRUPTED)
 
 
+def _refuse_idle(names: list[str], *, stated_observer: bool) -> None:
+    """Refuse options of observers where there are none, or none whose map is measured, and rays where none is traced."""
+    if not stated_observer:
+        needless = ("distance", "target", "size", "pixels")
+        refuse(needless, "for --observer; the scene's own observers have places and screens of their own")
+    reads = {NOUNS[word].reads for name in names if (word := name.partition(":")[0].strip()) in NOUNS}
+    if reads and not reads & {"map", "observer"}:
+        needless = ("observer", "distance", "target", "size", "pixels", "region", "rays_per_pixel")
+        refuse(needless, f"for measures of what an observer sees, and {', '.join(names)} is none")
+    if reads == {"observer"}:
+        refuse(["rays"], f"for measures of a trace, and {', '.join(names)} is none")
+
+
 def _settings(texts: list[str]) -> dict[str, tuple[float, ...]]:
     """Parameters and values.
 
@@ -180,12 +196,8 @@ def _observers(texts: list[str] | None, distance: float, target: str) -> list[Ob
     return [Observer(theta, phi, distance, (x, y, z)) for theta, phi in angles(texts)]
 
 
-def _screen(size: str | None, pixels: str, *, stated: bool) -> Screen | tuple[int, int] | None:
-    """Of the size that is stated, else to be framed; None for the scene's own observers."""
-    if not stated:
-        if size is not None:
-            raise typer.BadParameter("--size: for --observer; the scene's own observers have screens of their own")
-        return None
+def _screen(size: str | None, pixels: str) -> Screen | tuple[int, int]:
+    """Of the size that is stated, else to be framed."""
     columns, rows = whole_numbers(both_sides(pixels), 2, "--pixels", PIXELS)
     if size is None:
         return columns, rows

@@ -13,6 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from etendue.cli.guard import guarded
+from etendue.cli.stated import Verb
 
 VERBS = {
     "demo": "etendue.cli.demo:demo",
@@ -54,7 +55,7 @@ def command_of(name: str) -> Any:
         found = typer.main.get_command(_found(FAMILIES_OF_VERBS[name]))
     else:
         alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-        alone.command(name)(guarded(name, _found(VERBS[name])))
+        alone.command(name, cls=Verb)(guarded(name, _found(VERBS[name])))
         found = typer.main.get_command(alone)
     found.name = name
     return found

@@ -10,13 +10,17 @@ from typing import Annotated, Any
 import typer
 
 from etendue.cli.convert import in_unit, with_flux
+from etendue.cli.detectors import check_detector
 from etendue.cli.options import Flux, Json, Threads, Unit
+from etendue.cli.stated import refuse
 from etendue.cli.terminal import check_outputs, complain, count, print_json, progress_bar, say
 from etendue.lightfield.light_field import LightField
 from etendue.quantities.ray_set import RaySet
 from etendue.scene import Scene
+from etendue.tracing.result import TraceResult
+from etendue.tracing.storage import is_result_file
 from etendue.viewer.file_output import PAGE_EXTENSIONS, write_page
-from etendue.viewer.opening import SCENE_RAYS, Viewable, exhibit_of, open_viewable
+from etendue.viewer.opening import SCENE_RAYS, Viewable, exhibit_of, of_detector, open_viewable
 from etendue.viewer.server import ViewerServer
 
 
@@ -63,7 +67,11 @@ def view(
 ) -> None:
     """Look at a source from all sides and measure it: in the browser, or in a page of one file to be handed on."""
     check_outputs([output] if output else [], PAGE_EXTENSIONS)
-    viewable = _in_unit(open_viewable(file, detector), file, flux, unit)
+    if output is not None:
+        refuse(("port", "browser"), "for a page that is served, and --output writes one; leave it out")
+    viewable = _in_unit(_opened(file, detector), file, flux, unit)
+    if not isinstance(viewable, Scene):
+        refuse(("rays", "seed"), f"for scenes, which are traced; {file} is none")
     total = (
         (rays or SCENE_RAYS) if isinstance(viewable, Scene) else len(viewable) if isinstance(viewable, RaySet) else 0
     )
@@ -107,6 +115,21 @@ def view(
             webbrowser.open(server.url)
         with contextlib.suppress(KeyboardInterrupt):
             server.serve_forever()
+
+
+def _opened(file: Path, detector: str | None) -> Viewable:
+    """What the file holds, or what the detector of a trace saw.
+
+    Raises
+    ------
+    UnknownNameError, ArgumentError
+        If there is no such detector, or several and none is named.
+    """
+    if detector is None or not (file.is_file() and is_result_file(file)):
+        return open_viewable(file, detector)
+    result = TraceResult.load(file)
+    check_detector(result, detector, {**result.images, **result.illuminance, **result.rays}, "map or rays")
+    return of_detector(result, detector)
 
 
 def _in_unit(viewable: Viewable, file: Path, flux: str | None, unit: str | None) -> Viewable:
