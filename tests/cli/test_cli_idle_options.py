@@ -48,8 +48,9 @@ def folder(tmp_path: Path) -> Path:
         ("--size 10" + " --region -5,5,-5,5" * 10 + " -o a.png", "10 regions"),
     ],
 )
+@pytest.mark.usefixtures("folder")
 def test_a_bad_region_is_told_before_the_map_is_worked_out(
-    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch, words: str, told: str
+    run: Run, monkeypatch: pytest.MonkeyPatch, words: str, told: str
 ) -> None:
     monkeypatch.setattr(luminance_verb, "luminance_map", lambda *_, **__: pytest.fail("a map was worked out"))
     outcome = run("luminance", "lamp.tm25ray", "--observer", "0,0", *words.split(), "-o", "a.npz")
@@ -58,7 +59,8 @@ def test_a_bad_region_is_told_before_the_map_is_worked_out(
     assert not Path("a.npz").exists()
 
 
-def test_a_region_beside_the_screen_of_one_map_of_several_leaves_no_picture(run: Run, folder: Path) -> None:
+@pytest.mark.usefixtures("folder")
+def test_a_region_beside_the_screen_of_one_map_of_several_leaves_no_picture(run: Run) -> None:
     a_map().replace(screen=et.Screen(2, 2, 4, 4)).save("small.npz")
     outcome = run("plot", "dim.npz", "small.npz", "-o", "{name}.png", "--region", "2,4,2,4")
     assert outcome.status == 1
@@ -66,7 +68,8 @@ def test_a_region_beside_the_screen_of_one_map_of_several_leaves_no_picture(run:
     assert not list(Path().glob("*.png"))
 
 
-def test_a_map_is_kept_where_its_picture_is_refused(run: Run, folder: Path) -> None:
+@pytest.mark.usefixtures("folder")
+def test_a_map_is_kept_where_its_picture_is_refused(run: Run) -> None:
     """Only the map tells that no ray came into the region, in a corner beside the rings of radius 30 mm."""
     words = ("--observer", "0,0", "--size", "80", "--pixels", "8", "--method", "cone", "--region", "30,40,30,40")
     outcome = run("luminance", "lamp.tm25ray", *words, "-o", "a.png", "-o", "a.npz")
@@ -75,7 +78,8 @@ def test_a_map_is_kept_where_its_picture_is_refused(run: Run, folder: Path) -> N
     assert et.read_map("a.npz").values.shape == (8, 8)
 
 
-def test_regions_of_illuminance_in_figures(run: Run, folder: Path) -> None:
+@pytest.mark.usefixtures("folder")
+def test_regions_of_illuminance_in_figures(run: Run) -> None:
     """Left upper quarter: 10, 20, 50, 60 lx; each ± 10 %: the root of 1 + 4 + 25 + 36, over 4, is 2.03."""
     outcome = run("plot", "desk.npz", "-o", "a.svg", "--region", "-4,0,0,4")
     assert outcome.status == 0, outcome.err
@@ -84,7 +88,8 @@ def test_regions_of_illuminance_in_figures(run: Run, folder: Path) -> None:
     assert "mean 85 lx, least/mean 0.118, flux 0.00544 lm" in outcome.out
 
 
-def test_log_is_the_scale_log(run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("folder")
+def test_log_is_the_scale_log(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[str] = []
     monkeypatch.setattr(plot_verb, "plot_map", lambda *given, **_: drawn.append(given[2]))
     for words in ((), ("--log",), ("--scale", "log"), ("--log", "--scale", "log"), ("--scale", "linear")):
@@ -165,12 +170,14 @@ USED = (
 
 @pytest.mark.slow
 @pytest.mark.parametrize("call", USED)
-def test_what_changes_something_is_taken(run: Run, folder: Path, call: str) -> None:
+@pytest.mark.usefixtures("folder")
+def test_what_changes_something_is_taken(run: Run, call: str) -> None:
     outcome = run(*call.split())
     assert outcome.status == 0, outcome.err
 
 
-def test_a_scan_that_tells_its_instrument_takes_no_other(run: Run, folder: Path) -> None:
+@pytest.mark.usefixtures("folder")
+def test_a_scan_that_tells_its_instrument_takes_no_other(run: Run) -> None:
     """Beam, aperture and distance stand in its file, so that a scan of the bare beam would say less; nor do ways mix."""
     goniometer = et.ScatterGoniometer(photons=1e6)
     sample = et.bsdf.ABg(a=0.003, b=1e-4, g=2.2)
@@ -220,7 +227,8 @@ def test_a_detector_that_there_is_not(run: Run, traced: Path, verb: str, detecto
     assert all(words in outcome.err for words in told), outcome.err
 
 
-def test_a_detector_of_a_trace_without_any(run: Run, folder: Path) -> None:
+@pytest.mark.usefixtures("folder")
+def test_a_detector_of_a_trace_without_any(run: Run) -> None:
     et.trace(et.Scene.load("scene.toml"), rays=100).save("bare.h5")
     outcome = run("luminance", "bare.h5", "--observer", "0,0", "--detector", "desk", "-o", "a.npz")
     assert outcome.status == 1

@@ -109,7 +109,8 @@ def print_map(lmap: LuminanceMap, regions: Sequence[AnyRegion] = (), *, notes: b
 def _print_regions(lmap: AnyMap, regions: Sequence[AnyRegion]) -> None:
     for number, region in enumerate(regions, 1):
         found = region_statistics(lmap, region)
-        mean_error = found.mean_error if pixels_err_together(lmap) else found.mean_error_apart
+        together = isinstance(lmap, LuminanceMap) and pixels_err_together(lmap)
+        mean_error = found.mean_error if together else found.mean_error_apart
         say(
             f"  region {number}: mean {measured(found.mean, mean_error, found.unit)}, "
             f"minimum {counted(found.minimum, found.unit)}, maximum {counted(found.maximum, found.unit)}, "

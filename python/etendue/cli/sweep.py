@@ -162,8 +162,8 @@ def sweep(
 def _refuse_idle(names: list[str], *, stated_observer: bool) -> None:
     """Refuse options of observers where there are none, or none whose map is measured, and rays where none is traced."""
     if not stated_observer:
-        needless = ("distance", "target", "size", "pixels")
-        refuse(needless, "for --observer; the scene's own observers have places and screens of their own")
+        of_observers = ("distance", "target", "size", "pixels")
+        refuse(of_observers, "for --observer; the scene's own observers have places and screens of their own")
     reads = {NOUNS[word].reads for name in names if (word := name.partition(":")[0].strip()) in NOUNS}
     if reads and not reads & {"map", "observer"}:
         needless = ("observer", "distance", "target", "size", "pixels", "region", "rays_per_pixel")
