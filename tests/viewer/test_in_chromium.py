@@ -15,6 +15,7 @@ from oracles.browser import Browser, browsing
 from oracles.packaged_led import PackagedLed
 
 from viewer.conftest import FIELDS
+from viewer.viewables import spot
 from viewer.views import page_views
 
 VIEWS = 20
@@ -132,6 +133,25 @@ def test_the_address_tells_what_is_upright_and_the_command_repeats_it(
     assert (exact > 0).sum() > 3
     assert np.abs(found - exact).max() <= bound * exact.max()
     assert np.abs(found[exact > 0] / exact[exact > 0] - 1).max() < bound
+
+
+@pytest.mark.slow
+def test_the_intensity_of_the_view_is_that_of_the_field(browser: Browser, tmp_path: Path) -> None:
+    """A spot of 7° in an oblique direction: at its top and on its side, between the nodes of any table of round angles."""
+    field = spot(width=7.0, theta=23.7, phi=33.3)
+    path = tmp_path / "spot.html"
+    opened(browser, exhibit_of(field, name="spot"), path)
+    for theta, phi in ((23.7, 33.3), (21.4, 36.1), (28.6, 33.3)):
+        browser.evaluate(f"etendue.setView({{theta: {theta}, phi: {phi}}})")
+        browser.wait(f"!etendue.state.here.quick && etendue.state.here.theta === {theta} && etendue.finished()")
+        text = browser.evaluate("document.getElementById('intensity').textContent")
+        value, _, _, unit, here = text.split()
+        found = float(value) * {"kcd": 1e3, "cd": 1.0}[unit]
+        truth = field.core.intensity(et.Observer(theta, phi, 1).direction[None], 256)[0]
+        assert here == "here"
+        assert found == pytest.approx(truth, rel=0.01)  # as many digits as its error has
+        assert browser.evaluate("etendue.state.here.value") == pytest.approx(truth, rel=2e-3 + 1.5e-3)
+    quiet(browser, path)
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import etendue as et
@@ -12,9 +13,11 @@ from etendue.errors import ArgumentError, FormatError, UnknownNameError
 from etendue.viewer.file_output import write_page
 from etendue.viewer.geometry import scene_geometry
 from etendue.viewer.opening import exhibit_of, light_of, open_viewable
+from etendue.viewer.subjects import first_view, intensity_solid
+from scipy import interpolate
 
 from viewer.conftest import FIELDS
-from viewer.viewables import LAMP, make_files, traced
+from viewer.viewables import LAMP, make_files, spot, traced
 
 
 @pytest.fixture
@@ -102,7 +105,6 @@ def test_the_light_around_a_scene_is_all_of_it() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_the_progress_of_a_scene_goes_on_through_the_fit() -> None:
     """It rises from the first rays to all of them, and most of it is the fit's."""
     seen: list[int] = []
@@ -111,6 +113,32 @@ def test_the_progress_of_a_scene_goes_on_through_the_fit() -> None:
     assert seen == sorted(seen)
     assert seen[-1] == 5000
     assert sum(done > 1250 for done in seen) > 3
+
+
+@pytest.mark.slow
+def test_the_intensity_solid_holds_the_beam() -> None:
+    """Of a spot of 7° in an oblique direction: what is drawn, linear between the nodes, is off by 8 % of the top at most.
+
+    Between even nodes of 10° and 2.5° it is by 21 %. Against the core's sums towards directions over the spot. The first look
+    from where it is brightest is within 1° of its middle.
+    """
+    theta, phi = 23.7, 33.3
+    field = spot(width=7.0, theta=theta, phi=phi)
+    solid = intensity_solid(field)
+    c, gamma = np.array(solid["c"]), np.array(solid["gamma"])
+    assert c.size * gamma.size <= 24_000
+    values = np.array(solid["values"]).reshape(c.size, gamma.size)
+    drawn = interpolate.RegularGridInterpolator((np.append(c, 360.0), gamma), np.append(values, values[:1], axis=0))
+    lean, turn = np.meshgrid(theta + np.linspace(-9.1, 9.3, 24), phi + np.linspace(-21.1, 20.7, 23))
+    t, p = np.radians(lean).ravel(), np.radians(turn).ravel()
+    k = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=1)
+    truth = field.core.intensity(k, 64)
+    found = drawn(np.stack([turn.ravel(), lean.ravel()], axis=1))
+    assert np.abs(found - truth).max() < 0.08 * truth.max()
+    view = first_view(field, solid)
+    assert et.Observer(view["theta"], view["phi"], 1).direction @ et.Observer(theta, phi, 1).direction > math.cos(
+        math.radians(1.0)
+    )
 
 
 def test_curves_lie_on_the_faces_and_in_their_planes() -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import etendue as et
+import numpy as np
 
 from viewer.conftest import FIELDS
 
@@ -35,3 +36,15 @@ def make_files(folder: Path) -> Path:
     et.Scene(sources=[LAMP]).save(folder / "scene.toml")
     (folder / "notes.txt").write_text("nothing to be seen")
     return folder
+
+
+def spot(*, width: float, theta: float, phi: float, rays: int = 40_000) -> et.LightField:
+    """A disk whose beam has this full width at half its maximum [°] about a direction [°]."""
+    rng = np.random.default_rng(7)
+    around = rng.normal(0.0, np.radians(width) / np.sqrt(8 * np.log(2)), (rays, 2))
+    right, up, toward = et.Observer(theta, phi, 1).axes()
+    direction = toward + around @ np.array([right, up])
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    radius, turn = 3.0 * np.sqrt(rng.random(rays)), 2 * np.pi * rng.random(rays)
+    place = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0 * turn], axis=1)
+    return et.LightField.fit(et.RaySet(place, direction, np.full(rays, 100 / rays)), et.Disk(radius=3.2))

@@ -188,7 +188,9 @@ class FieldTables:
         parts = tuple(PartTables.of(chart, part, step, error_step) for chart, part in pairs)
         report = field.report
         # Not of the images that a symmetry gives: they tell nothing new of a region that lies over them.
-        rests = report.effective_rays if math.isfinite(report.effective_rays) else float(report.rays - report.unmet_rays)
+        rests = (
+            report.effective_rays if math.isfinite(report.effective_rays) else float(report.rays - report.unmet_rays)
+        )
         return cls(parts, step, error_step, field.total_flux / rests if rests > 0.0 else math.nan)
 
     @classmethod

@@ -9,13 +9,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from etendue.lightfield.field_rays import FieldRays
 from etendue.lightfield.light_field import LightField
 from etendue.luminance.framing import centre_of_light, framed, probe
+from etendue.quantities.node_choice import choose_nodes
 from etendue.quantities.observer import Observer
 from etendue.quantities.pixel_map import PixelMap
 from etendue.quantities.powers_of_ten import counted
 from etendue.units import LUMINANCE_UNIT
 from etendue.viewer.field_tables import FieldTables
+
+Array = npt.NDArray[np.float64]
 
 MOST_BYTES = 5_000_000
 """Letters of the tables of a light field: with the page around them a file stays below 6 MB."""
@@ -24,7 +28,13 @@ DISTANCE = 1000.0
 """Of the first observer [mm], if the light is small against it."""
 
 C_PLANES, GAMMA_STEP = 36, 2.5
-"""Nodes of the intensity solid [°]."""
+"""Nodes of the intensity solid where it is smooth [°]: between these there are those that its beams ask for."""
+
+SAMPLE = 20_000
+"""Rays drawn from a field that those are chosen by."""
+
+MOST_DIRECTIONS = 24_000
+"""Of the solid."""
 
 INTENSITY_POINTS = 32
 """Points along either side of a part over which intensity is summed."""
@@ -116,7 +126,7 @@ def packed_map(lmap: PixelMap) -> dict[str, Any]:
     }
 
 
-def _floats(values: npt.NDArray[np.float64]) -> str:
+def _floats(values: Array) -> str:
     return base64.b64encode(values.astype("<f4").tobytes()).decode("ascii")
 
 
@@ -168,9 +178,8 @@ def first_view(field: LightField, solid: dict[str, Any]) -> dict[str, Any]:
 
 
 def intensity_solid(field: LightField) -> dict[str, Any]:
-    """Intensity of a field at even directions [cd or W/sr], plane by plane."""
-    c = np.arange(C_PLANES) * 360.0 / C_PLANES
-    gamma = np.arange(0.0, 180.0 + GAMMA_STEP / 2, GAMMA_STEP)
+    """Intensity of a field towards the nodes of its solid [cd or W/sr], plane by plane."""
+    c, gamma = solid_nodes(field)
     turn, lean = np.radians(c)[:, None], np.radians(gamma)[None, :]
     k = np.stack([np.sin(lean) * np.cos(turn), np.sin(lean) * np.sin(turn), np.cos(lean) + 0.0 * turn], axis=-1)
     values = field.core.intensity(np.ascontiguousarray(k.reshape(-1, 3)), INTENSITY_POINTS)
@@ -180,6 +189,30 @@ def intensity_solid(field: LightField) -> dict[str, Any]:
         "values": [float(f"{value:.5g}") for value in values],
         "unit": "cd" if field.flux_unit == "lm" else "W/sr",
     }
+
+
+def solid_nodes(field: LightField) -> tuple[Array, Array]:
+    """Planes C and angles γ [°] that hold the beams of a field: those of an intensity table, among even ones.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> field = et.LightField.fit(et.RingSource(rays=20_000), et.Disk(radius=30), depths=(3, 3, 2, 2))
+    >>> c, gamma = solid_nodes(field)
+    >>> c[0], gamma[0], gamma[-1], len(c) * len(gamma) <= MOST_DIRECTIONS
+    (0.0, 0.0, 180.0, True)
+    """
+    drawn = next(FieldRays(field, SAMPLE).batches())
+    chosen = choose_nodes(drawn.direction, drawn.flux, SAMPLE).nodes
+    c = np.union1d(np.arange(C_PLANES) * 360.0 / C_PLANES, chosen.planes)
+    gamma = np.union1d(np.arange(0.0, 180.0 + GAMMA_STEP / 2, GAMMA_STEP), chosen.gamma)
+    while c.size * gamma.size > MOST_DIRECTIONS:
+        # The closest of both kinds are thinned out first; the ends of γ stay.
+        if np.diff(c).min() * np.sin(np.radians(gamma)).max() < np.diff(gamma).min():
+            c = np.delete(c, 1 + int(np.diff(c).argmin()))
+        else:
+            gamma = np.delete(gamma, 1 + int(np.diff(gamma[:-1]).argmin()))
+    return c, gamma
 
 
 def _facts(field: LightField) -> str:

@@ -18,6 +18,16 @@ export function diskToSquare(x, y) {
   return wide ? [0.5 * r + 0.5, 0.5 * other + 0.5] : [0.5 * other + 0.5, 0.5 * r + 0.5];
 }
 
+/** From the unit square to the unit disk, by that map. */
+export function squareToDisk(u, v) {
+  const [a, b] = [2 * u - 1, 2 * v - 1];
+  const wide = Math.abs(a) > Math.abs(b);
+  const [r, other] = wide ? [a, b] : [b, a];
+  const turn = r === 0 ? 0 : (other / r) * EIGHTH;
+  const [along, across] = [r * Math.cos(turn), r * Math.sin(turn)];
+  return wide ? [along, across] : [across, along];
+}
+
 /** Azimuth of (x, y) as a fraction of a turn; the seam lies at -x. */
 function turns(x, y) {
   return clamp(Math.atan2(y, x) / (2 * Math.PI) + 0.5);
@@ -94,4 +104,37 @@ export function cross(chart, point, direction) {
     default:
       throw new Error(`there is no chart of the shape ${chart.shape}`);
   }
+}
+
+export function areaOf({ shape, size: [width, height] }) {
+  const areas = {
+    rectangle: width * height,
+    disk: Math.PI * width * width,
+    hemisphere: 2 * Math.PI * width * width,
+    tube: 2 * Math.PI * width * height,
+  };
+  return areas[shape];
+}
+
+/**
+ * The light that leaves a part at the place (s1, s2) along a unit vector `d` in the axes of the part: the cosine to the normal
+ * there and [s1, s2, a, b], or null if it goes inwards.
+ */
+export function departing({ shape }, [s1, s2], d) {
+  let [cosine, p, q] = [d[2], d[0], d[1]];
+  if (shape === "hemisphere") {
+    const [x, y] = squareToDisk(s1, s2);
+    const r2 = x * x + y * y;
+    const scale = Math.sqrt(Math.max(2 - r2, 0));
+    const n = [x * scale, y * scale, Math.max(1 - r2, 0)];
+    const shear = (d[0] * n[0] + d[1] * n[1]) / (1 + n[2]) + d[2];
+    cosine = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
+    [p, q] = [d[0] - n[0] * shear, d[1] - n[1] * shear];
+  } else if (shape === "tube") {
+    const [nx, ny] = [-Math.cos(2 * Math.PI * s1), -Math.sin(2 * Math.PI * s1)];
+    cosine = d[0] * nx + d[1] * ny;
+    [p, q] = [d[1] * nx - d[0] * ny, d[2]];
+  }
+  const place = departure(cosine > 0, s1, s2, p, q);
+  return place && { cosine, place };
 }

@@ -1,6 +1,6 @@
 // A light field read in double precision, as the core reads it: theory.md, eq. 38; the core's `light_field.rs` and `look.rs`.
 
-import { cross } from "./chart.js";
+import { areaOf, cross, departing, turned } from "./chart.js";
 import { constantTable, readTable } from "./tables.js";
 
 // Of the core's `look.rs`: how many times as many points there are where they differ much, by which share of the error or of
@@ -9,6 +9,8 @@ const FINER = 16;
 const LEFT = [0.25, 0.005];
 const MOST_POINTS = 2048;
 const HALVES = 64;
+// Points along either side of a part over which intensity is summed: as many as its cells, within these.
+const INTENSITY_POINTS = [64, 128];
 // Of fewer, as those of regions, the neighbours are not looked at: the pixels of a region make up for each other's edges.
 const OWN_POINTS = 16;
 
@@ -41,6 +43,14 @@ function left(shares, area) {
   if (doublings >= last) return shares[last];
   const lower = Math.floor(doublings);
   return shares[lower] + (doublings - lower) * (shares[lower + 1] - shares[lower]);
+}
+
+/** Of a sum over a part of its value and the three kinds of its errors, spread over a share of its area. */
+function varianceOf(part, sums, area) {
+  const [n1, n2] = part.ratio.shape;
+  const fine = part.spaceError.shape[0];
+  const cells = sums[1] * left(part.cellsLeft, area * n1 * n2);
+  return cells ** 2 + (sums[2] * left(part.withinLeft, area * fine * fine)) ** 2 + sums[3] ** 2;
 }
 
 /** How far the average over the points of a lattice may be off: by their variance, and by how every other of them differs. */
@@ -210,14 +220,48 @@ export class Field {
       if (points === 0) continue;
       const side = (axis) => Math.sqrt(12 * Math.max(squares[axis] / points - (away[axis] / points) ** 2, 0));
       const area = side(0) * side(1);
-      const [n1, n2] = part.ratio.shape;
-      const fine = part.spaceError.shape[0];
       value += sums[0] / samples;
-      variance +=
-        ((sums[1] * left(part.cellsLeft, area * n1 * n2)) / samples) ** 2 +
-        ((sums[2] * left(part.withinLeft, area * fine * fine)) / samples) ** 2 +
-        (sums[3] / samples) ** 2;
+      variance += varianceOf(part, sums.map((x) => x / samples), area);
     }
     return { value, error: Math.sqrt(variance), left: latticeError(totals) };
+  }
+  /**
+   * Intensity towards a direction and its standard error, ∫ L cos θ dA over the surface [cd or W/sr], as pieces of work: each
+   * returns its sums, of which `intensity` makes the whole. `most`: points along either side of a part.
+   */
+  intensityPieces(direction, most = INTENSITY_POINTS[1]) {
+    return this.parts.flatMap((part, index) => {
+      const d = turned(part.chart.axes, direction);
+      const sides = [0, 1].map((axis) => {
+        const cells = Math.max(part.ratio.shape[axis], part.space.shape[axis], INTENSITY_POINTS[0]);
+        return Math.min(cells, most);
+      });
+      const each = (areaOf(part.chart) / (sides[0] * sides[1])) * 1e-6;
+      return Array.from({ length: sides[0] }, (_, i) => () => {
+        const sums = [0, 0, 0, 0];
+        let lit = 0;
+        for (let j = 0; j < sides[1]; j++) {
+          const found = departing(part.chart, [(i + 0.5) / sides[0], (j + 0.5) / sides[1]], d);
+          if (!found) continue;
+          lit += 1 / (sides[0] * sides[1]);
+          readPart(part, found.place).forEach((x, k) => (sums[k] += x * found.cosine * each));
+        }
+        return { index, sums, lit };
+      });
+    });
+  }
+
+  /** The whole of those pieces; their errors average out as they do over a pixel that holds all of the source. */
+  intensity(pieces) {
+    let value = 0;
+    let variance = 0;
+    this.parts.forEach((part, index) => {
+      const own = pieces.filter((piece) => piece.index === index);
+      const lit = own.reduce((sum, piece) => sum + piece.lit, 0);
+      const sums = [0, 1, 2, 3].map((k) => own.reduce((sum, piece) => sum + piece.sums[k], 0));
+      value += sums[0];
+      variance += varianceOf(part, sums, lit);
+    });
+    return { value, error: Math.sqrt(variance) };
   }
 }

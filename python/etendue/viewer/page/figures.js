@@ -37,6 +37,18 @@ export function listRegions() {
 
 export const fields = {};
 
+const QUICK = 16; // points along either side of a part for the intensity while the view moves
+
+/** Intensity towards the observer: of few points until `motion` has worked it out at rest. */
+export function intensityHere() {
+  const { view, field, here } = state;
+  if (here?.theta !== view.theta || here.phi !== view.phi) {
+    const pieces = field.intensityPieces(view.toward, QUICK).map((work) => work());
+    state.here = { theta: view.theta, phi: view.phi, quick: true, ...field.intensity(pieces) };
+  }
+  return state.here;
+}
+
 export function showView() {
   const { view, look } = state;
   for (const name of ["theta", "phi", "distance", "width"]) fields[name](view[name]);
@@ -45,7 +57,11 @@ export function showView() {
   fields.low(look.range[0] / unit, 4);
   fields.high(look.range[1] / unit, 4);
   $("scale-unit").textContent = look.errors ? "%" : packed.unit;
-  if (state.solid) $("intensity").textContent = `${withUnit(state.solid.towards(view.theta, view.phi), packed.intensity.unit)} here`;
+  if (state.solid) {
+    const { value, error, quick } = intensityHere();
+    const { unit } = packed.intensity;
+    $("intensity").textContent = `${quick ? `≈ ${withUnit(value, unit, 3)}` : measured(value, error, unit)} here`;
+  }
 }
 
 /** The view as the command line takes it; numbers with so many digits that the core's map has the same pixels. */

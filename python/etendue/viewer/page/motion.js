@@ -1,10 +1,10 @@
 // The view: set, in motion, at rest, and drawn frame by frame.
 
-import { listRegions, showCommand, showReading, showView } from "./figures.js";
+import { intensityHere, listRegions, showCommand, showReading, showView } from "./figures.js";
 import { drawMarks, drawSection } from "./overlay.js";
 import { $ } from "./panel.js";
 import { PixelMap } from "./picture.js";
-import { measureRegion, measureSection } from "./readings.js";
+import { measureIntensity, measureRegion, measureSection } from "./readings.js";
 import { PIXEL, draw, packed, server, state } from "./state.js";
 import { View } from "./view.js";
 
@@ -67,6 +67,12 @@ export async function rest() {
   const open = state.regions.filter((region) => !known(region.of));
   for (const region of open) region.figures = null;
   listRegions();
+  if (state.solid && intensityHere().quick) {
+    const found = await measureIntensity(state.field, view, current);
+    if (!current()) return;
+    state.here = { theta: view.theta, phi: view.phi, ...found };
+    draw();
+  }
   for (const region of open) {
     const figures = await measureRegion(subject, view, region.corners, current);
     if (!current()) return;
@@ -117,7 +123,7 @@ export function frame(now) {
   });
   showReading();
   showView();
-  state.solid?.draw(view);
+  state.solid?.draw(view, intensityHere().value);
   if (state.line && state.section) drawSection($("section"), state.section, packed.unit, look.logarithmic);
   // As long as it moves, frames follow one another, so that their distance tells how long one takes.
   if (state.painter?.unfinished || state.moving) draw();

@@ -140,6 +140,12 @@ export function fluxThrough(field, view, pixels) {
   return { value, error: Math.hypot(Math.sqrt(value * field.rayFlux), Math.sqrt(spread / FLUX_PARTS)) };
 }
 
+/** Intensity of a field towards the observer, who stands far away, and its standard error; null if it was given up. */
+export async function measureIntensity(field, view, current) {
+  const pieces = await inSlices(field.intensityPieces(view.toward), (work) => work(), current);
+  return pieces && field.intensity(pieces);
+}
+
 /** Values along a line on the screen from one place to another [mm]: points of equal steps, each of its own pixel's size. */
 export async function measureSection(subject, view, [from, to], current) {
   const length = Math.hypot(to[0] - from[0], to[1] - from[1]);

@@ -22,18 +22,6 @@ export class Solid {
     return this.values[(plane % this.c.length) * this.gamma.length + ring];
   }
 
-  /** Intensity towards a direction, between the nodes linearly. */
-  towards(theta, phi) {
-    const step = 360 / this.c.length;
-    const at = (((phi % 360) + 360) % 360) / step;
-    const plane = Math.floor(at);
-    let ring = this.gamma.findIndex((g, i) => i + 1 < this.gamma.length && theta <= this.gamma[i + 1]);
-    if (ring < 0) ring = this.gamma.length - 2;
-    const share = (theta - this.gamma[ring]) / (this.gamma[ring + 1] - this.gamma[ring]);
-    const along = (p) => this.value(p, ring) + share * (this.value(p, ring + 1) - this.value(p, ring));
-    return along(plane) + (at - plane) * (along(plane + 1) - along(plane));
-  }
-
   /** Right, up and near of a point in the solid's own picture. */
   seen([x, y, z]) {
     const [c, s] = [Math.cos((this.turn * Math.PI) / 180), Math.sin((this.turn * Math.PI) / 180)];
@@ -42,7 +30,8 @@ export class Solid {
     return [a, z * ct - near * st, near * ct + z * st];
   }
 
-  draw(view) {
+  /** `here`: the intensity towards the observer of the view. */
+  draw(view, here) {
     const { canvas } = this;
     const scale = window.devicePixelRatio || 1;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.round(x * scale));
@@ -54,7 +43,7 @@ export class Solid {
     const pen = canvas.getContext("2d");
     pen.clearRect(0, 0, width, height);
     pen.drawImage(this.body, 0, 0);
-    this.drawDirection(pen, scale, view);
+    this.drawDirection(pen, scale, view, here);
   }
 
   /** The body itself, which does not change, on a canvas of its own; and where points of it are on that. */
@@ -110,9 +99,9 @@ export class Solid {
     }
   }
 
-  drawDirection(pen, scale, view) {
+  drawDirection(pen, scale, view, here) {
     const { place } = this;
-    const value = this.towards(view.theta, view.phi) / this.most;
+    const value = here / this.most;
     const direction = unit(view.theta, view.phi);
     const tip = place(this.seen(direction.map((x) => x * Math.max(value, 0.02))));
     const end = place(this.seen(direction.map((x) => x * Math.max(1.12 * value, 0.35))));

@@ -10,6 +10,8 @@ export const server = serverOf();
 export const state = {
   view: null,
   subject: null,
+  field: null,
+  here: null,
   look: { range: [0, 1], logarithmic: false, errors: false, isolines: 0, grid: false, colours: "inferno" },
   ranges: { light: null, error: null },
   tool: "look",
