@@ -7,7 +7,8 @@ from typing import Any
 
 from etendue.cli.terminal import say
 from etendue.quantities.data_sheet import data_sheet
-from etendue.quantities.intensity import LUMINAIRE_FACTS, Intensity
+from etendue.quantities.intensity import Intensity
+from etendue.quantities.luminaire_facts import LUMINAIRE_FACTS
 from etendue.quantities.measured import measured, peak_line
 from etendue.quantities.spectrum import Spectrum
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from etendue.quantities.beam_angle import FIELD, BeamAngle, beam_angle, cut_off_angle
 from etendue.quantities.intensity import Intensity
+from etendue.quantities.measured import measured
 from etendue.quantities.zonal_flux import zonal_flux
 
 FLUX_CODE_ZONES = (0.0, math.degrees(math.acos(0.75)), 60.0, math.degrees(math.acos(0.25)), 90.0, 180.0)
@@ -37,8 +38,10 @@ class DataSheet:
     per_klm : float
         What makes cd/klm of cd: 1 000 lm over the flux of the lamps where it is known, else that of the luminaire. NaN for
         watts.
-    glare : tuple of (float, float)
-        γ [°], and the largest intensity from there to 90° [cd/klm; cd or W/sr if `per_klm` is NaN], at 65°, 70°, 80°, 90°.
+    glare : tuple of (float, float, float)
+        γ [°], at 65°, 70°, 80° and 90°; the largest intensity from there to 90°, less what chance lifts the largest of many
+        noisy values by (`Intensity.largest_between`), and its standard error, NaN where unknown [cd/klm; cd or W/sr if
+        `per_klm` is NaN].
     flux_unit : {"lm", "W"}
 
     Examples
@@ -54,7 +57,7 @@ class DataSheet:
     zones: tuple[tuple[float, float, float, float], ...]
     flux_code: tuple[float, ...]
     per_klm: float
-    glare: tuple[tuple[float, float], ...]
+    glare: tuple[tuple[float, float, float], ...]
     flux_unit: str
 
     def __repr__(self) -> str:
@@ -79,7 +82,9 @@ class DataSheet:
         if not all(math.isnan(share) for share in self.flux_code):
             found.append(f"CIE flux code {code}")
         unit = "cd/klm" if math.isfinite(self.per_klm) else ("cd" if self.flux_unit == "lm" else "W/sr")
-        largest = ", ".join(f"{gamma:.0f}° on {value:.4g}" for gamma, value in self.glare)
+        largest = ", ".join(
+            f"{gamma:.0f}° on {measured(value, error, '').rstrip()}" for gamma, value, error in self.glare
+        )
         return [*found, f"largest intensity up to the horizontal, from γ = {largest} {unit}"]
 
     def to_dict(self) -> dict[str, Any]:
@@ -94,7 +99,10 @@ class DataSheet:
             ],
             "cie_flux_code": [_known(share) for share in self.flux_code],
             "cd_per_klm_factor": _known(self.per_klm),
-            "largest_from": [{"gamma": gamma, "intensity": value} for gamma, value in self.glare],
+            "largest_from": [
+                {"gamma": gamma, "intensity": value, "standard_error": _known(error)}
+                for gamma, value, error in self.glare
+            ],
         }
 
 
@@ -129,10 +137,7 @@ def data_sheet(intensity: Intensity) -> DataSheet:
     luminous = intensity.flux_unit == "lm" and (lamps or total) > 0.0
     per_klm = 1e3 / (lamps or total) if luminous else math.nan
     factor = per_klm if math.isfinite(per_klm) else 1.0
-    rows = []
-    for low in (65.0, 70.0, 80.0, 90.0):
-        nodes = np.union1d([low, 90.0], intensity.gamma[(intensity.gamma >= low) & (intensity.gamma <= 90.0)])
-        rows.append((low, factor * float(intensity.at(intensity.c[:, None], nodes[None]).max())))
+    largest = [(low, intensity.largest_between(low, 90.0)) for low in (65.0, 70.0, 80.0, 90.0)]
     return DataSheet(
         beam=tuple(beam_angle(intensity, c) for c in planes),
         field=tuple(beam_angle(intensity, c, FIELD) for c in planes),
@@ -143,7 +148,7 @@ def data_sheet(intensity: Intensity) -> DataSheet:
         ),
         flux_code=code,
         per_klm=per_klm,
-        glare=tuple(rows),
+        glare=tuple((low, factor * found.value, factor * found.error) for low, found in largest),
         flux_unit=intensity.flux_unit,
     )
 

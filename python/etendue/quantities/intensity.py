@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from statistics import NormalDist
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -14,9 +13,11 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.angle_table import ROUNDING, gaps_of, hat_integrals, kinks_along, kinks_around
 from etendue.quantities.labelled import dataset
+from etendue.quantities.luminaire_facts import LUMINAIRE_FACTS, mirrored_facts, turned_facts
 from etendue.quantities.notebook import InNotebook
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.report import Complaint
+from etendue.quantities.unlifted import Unlifted, unlifted
 from etendue.units import FLUX_UNITS, INTENSITY_NAME, INTENSITY_UNIT, FluxUnit
 
 if TYPE_CHECKING:
@@ -26,50 +27,11 @@ Array = npt.NDArray[np.float64]
 Symmetry = Literal["none", "C0-C180", "C90-C270", "both", "rotational"]
 SYMMETRIES: tuple[str, ...] = get_args(Symmetry)
 
-LUMINAIRE_FACTS: dict[str, str] = {
-    "manufacturer": "name",
-    "luminaire": "name or description",
-    "catalogue_number": "of the luminaire",
-    "lamp": "description",
-    "test_report": "number or description",
-    "laboratory": "that tested",
-    "issue_date": "of the data, as the file spells it",
-    "lamps": "number of lamps",
-    "lamp_flux": "flux of all lamps together [lm]; missing for absolute photometry",
-    "stated_flux": "flux of the luminaire [flux unit] that a file states, if it does",
-    "input_power": "[W]",
-    "linear": "whether the luminaire is a linear one (EULUMDAT type 2)",
-    "opening_shape": "luminous opening: point, rectangle, box, circle, ellipse, sphere, …",
-    "opening_x": "its extent along C0-C180 [mm]",
-    "opening_y": "its extent along C90-C270 [mm]",
-    "opening_z": "its extent along the axis [mm]",
-    "housing_x": "extent of the luminaire along C0-C180 [mm]",
-    "housing_y": "extent of the luminaire along C90-C270 [mm]",
-    "housing_z": "extent of the luminaire along the axis [mm]",
-    "housing_round": "whether the luminaire is round, if a file says so",
-    "opening_heights": "height of the luminous opening at C0, C90, C180, C270 [mm], where they differ",
-    "extents_turned": "angle by which opening and luminaire stand turned from these axes, towards C90 [°], if they do",
-    "lamp_sets": "every lamp set of an EULUMDAT file, one mapping each",
-    "measurement_tilt": "tilt of the luminaire when it was measured [°], of an EULUMDAT file; nothing was turned back",
-    "conversion_factor": "for intensities, of an EULUMDAT file, if it is not 1; not applied",
-    "direct_ratios": "ten of an EULUMDAT file, if it has any",
-    "tilt": "lamp factors over the tilt of the luminaire, of an IES file; not applied",
-    "spectrum": "`Spectrum` of all its light, if a file tells it",
-    "keywords": "every keyword line of an IES file, as pairs",
-}
-"""What may be known of the luminaire beside its intensity, with its meaning."""
-
 UNTURNED = "nothing was turned or mirrored"
 """How notes on the direction of planes end that hold until somebody turns them."""
 
 TURNED, MIRRORED = "turned by", "mirrored:"
 """How the steps of a provenance begin that changed where the planes are."""
-
-OTHER_WAY = {"cylinder along length": "cylinder along width", "cylinder along width": "cylinder along length"}
-"""Shapes of openings that a quarter of a turn gives another name."""
-
-QUARTER_TURN = 1e-3
-"""Degrees within which a turn is one by a multiple of 90° for extents: over a metre they move by less than 0.02 mm."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -295,26 +257,55 @@ class Intensity(InNotebook):
     def peak_intensity(self) -> float:
         """The largest intensity, less what chance lifts the largest of many noisy values by [`unit`].
 
-        The largest of K values that are as good as equal is too large by m of their standard errors s on average, m being
-        the mean of the largest of K normal deviates, Φ⁻¹((K − ⅜)/(K + ¼)) [Blom1958]_. K is counted softly, as the sum over
-        all nodes of exp(−(difference/error)²), with the root mean square of the errors of both; it is 1 where nothing
-        comes near the maximum. Nodes in which the function has no kink are between others, and have no error of their own.
-        `maximum` where no error is known, and where nodes err together (`smooth`).
+        By the number of nodes that come near the largest one (`etendue.quantities.unlifted`) [Blom1958]_. Nodes in which
+        the function has no kink are between others, and have no error of their own. `maximum` where no error is known, and
+        where nodes err together (`smooth`).
         """
-        error = self.peak_error
-        if self.smooth or not error > 0.0:
-            return self.maximum
-        below = 2.0 * (self.maximum - self.values) ** 2 / (error**2 + np.nan_to_num(self.standard_error) ** 2)
-        weight = self._kinks.astype(np.float64)
-        # The first and the last node of all planes are one direction if they are poles.
-        weight[:, (self.gamma == 0.0) | (self.gamma == 180.0)] = 1.0 / self.c.size
-        alike = max(float((np.exp(-below) * weight).sum()), 1.0)
-        return self.maximum - error * NormalDist().inv_cdf((alike - 0.375) / (alike + 0.25))
+        return self.largest_between(0.0, 180.0).value
 
     @property
     def peak_error(self) -> float:
         """Standard error of `peak_intensity` [`unit`]: that of the largest node; NaN where unknown."""
         return float(self.standard_error.ravel()[self.values.argmax()])
+
+    def largest_between(self, low: float, high: float) -> Unlifted:
+        """The largest intensity from γ = `low` to `high` [°], less the lift of chance, as `peak_intensity` [`unit`].
+
+        Parameters
+        ----------
+        low, high : float
+            γ [°], 0 to 180, the second not below the first.
+
+        Returns
+        -------
+        Unlifted
+            `value`, and its standard error `error`; NaN where that is unknown.
+
+        Raises
+        ------
+        ArgumentError
+            If there are no such angles.
+
+        Examples
+        --------
+        >>> Intensity([0], [0, 40, 90], [[500.0, 100, 0]], 20.0).largest_between(20, 90)
+        Unlifted(value=300.0, error=20.0)
+        """
+        if not low <= high:
+            raise ArgumentError(
+                f"Intensity: γ from {low:g}° to {high:g}°; the first angle must not be above the second."
+            )
+        inner = self.gamma[(self.gamma > low) & (self.gamma < high)]
+        gamma = np.unique([low, *inner, high])
+        values = self.at(self.c[:, None], gamma)
+        # Between two nodes that err alike, the error of a value is theirs.
+        errors = np.stack([np.interp(gamma, self.gamma, row, left=0.0, right=0.0) for row in self.standard_error])
+        if self.smooth:
+            return unlifted(values, errors, np.zeros_like(values))
+        weight = np.stack([np.interp(gamma, self.gamma, row) for row in self._kinks.astype(np.float64)])
+        # The first and the last node of all planes are one direction if they are poles.
+        weight[:, (gamma == 0.0) | (gamma == 180.0)] = 1.0 / self.c.size
+        return unlifted(values, errors, weight)
 
     @property
     def _kinks(self) -> npt.NDArray[np.bool_]:
@@ -423,7 +414,7 @@ class Intensity(InNotebook):
         if not np.isfinite(angle):
             raise ArgumentError(f"Intensity: cannot be turned by {angle}°.")
         step = f"{TURNED} {angle:.9g}° about the axis"
-        return self._with_planes_at(self.c + angle, step, _turned(self.luminaire, angle))
+        return self._with_planes_at(self.c + angle, step, turned_facts(self.luminaire, angle))
 
     def mirrored(self) -> Intensity:
         """The mirror image in the plane C0-C180: what was at C is at -C.
@@ -431,7 +422,7 @@ class Intensity(InNotebook):
         Luminaire files count C counter-clockwise *from above*, looking against a z axis from which the light goes away;
         étendue counts it about the direction in which sources emit. This is what leads from one to the other.
         """
-        return self._with_planes_at(-self.c, f"{MIRRORED} C became -C", _mirrored(self.luminaire))
+        return self._with_planes_at(-self.c, f"{MIRRORED} C became -C", mirrored_facts(self.luminaire))
 
     @property
     def planes_moved(self) -> bool:
@@ -460,41 +451,3 @@ def _finite(name: str, numbers: npt.ArrayLike) -> Array:
     if not np.isfinite(array).all():
         raise ArgumentError(f"Intensity: {name} is not finite.")
     return array
-
-
-def _turned(facts: Mapping[str, Any], angle: float) -> dict[str, Any]:
-    """Extents after a turn about the axis: to the nearest quarter, and what is left as `extents_turned`."""
-    result = dict(facts)
-    whole = angle + float(result.pop("extents_turned", 0.0))
-    quarters = round(whole / 90.0)
-    for what in ("opening", "housing"):
-        x, y = (result.pop(f"{what}_{axis}", None) for axis in ("yx" if quarters % 2 else "xy"))
-        result |= {f"{what}_{axis}": extent for axis, extent in (("x", x), ("y", y)) if extent is not None}
-    if quarters % 2 and result.get("opening_shape") in OTHER_WAY:
-        result["opening_shape"] = OTHER_WAY[result["opening_shape"]]
-    if "opening_heights" in result:
-        result["opening_heights"] = tuple(result["opening_heights"][(k - quarters) % 4] for k in range(4))
-    left = whole - 90.0 * quarters
-    if abs(left) > QUARTER_TURN and (has_corners(facts, "opening") or has_corners(facts, "housing")):
-        result["extents_turned"] = left
-    return result
-
-
-def has_corners(facts: Mapping[str, Any], what: Literal["opening", "housing"]) -> bool:
-    """Whether the extents of the luminous opening or the housing are known, and a turn about the axis changes them.
-
-    Examples
-    --------
-    >>> has_corners({"opening_shape": "circle", "opening_x": 80.0, "opening_y": 80.0}, "opening")
-    False
-    """
-    x, y = (facts.get(f"{what}_{axis}", 0.0) for axis in "xy")
-    box = facts.get("opening_shape") in {"rectangle", "box"} or "opening_heights" in facts
-    return bool(x or y) and (x != y or (box if what == "opening" else not facts.get("housing_round")))
-
-
-def _mirrored(facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Extents of the mirror image in the plane C0-C180: C90 and C270 change places."""
-    heights = facts.get("opening_heights", ())
-    result = dict(facts) | ({"opening_heights": tuple(heights[k] for k in (0, 3, 2, 1))} if heights else {})
-    return result | ({"extents_turned": -facts["extents_turned"]} if "extents_turned" in facts else {})

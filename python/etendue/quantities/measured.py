@@ -46,7 +46,7 @@ def measured_peak(found: Intensity) -> str:
     >>> measured_peak(et.Intensity([0], [0, 90, 180], [[500.0, 0, 0]], [[20.0, 0, 0]]))
     '500 ± 20 cd'
     >>> measured_peak(et.Intensity([0], [0, 60, 120, 180], [[500.0, 505, 498, 502]], 20.0))
-    '485 ± 20 cd (largest value 505 cd, lifted by chance)'
+    '494 ± 20 cd (largest value 505 cd, lifted by chance)'
     """
     peak = measured(found.peak_intensity, found.peak_error, found.unit)
     if not found.maximum - found.peak_intensity > 0.5 * found.peak_error:

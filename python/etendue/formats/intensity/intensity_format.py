@@ -15,7 +15,8 @@ from etendue.errors import FormatError
 from etendue.formats.encodings import decoded
 from etendue.formats.head import Head
 from etendue.formats.intensity.symmetry import Array
-from etendue.quantities.intensity import Intensity, has_corners
+from etendue.quantities.intensity import Intensity
+from etendue.quantities.luminaire_facts import has_corners
 from etendue.quantities.measured import measured, measured_peak
 
 MOST_BYTES = 1 << 27
