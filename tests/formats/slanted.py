@@ -15,6 +15,7 @@ class Slanted:
     name, isotropic, reflects, transmits, both_sides = "slanted & co", False, True, True, False
     wavelengths: tuple[float, ...] = ()
     incidences = (5.0, 60.0)
+    turns = (0.0, 100.0, 200.0, 300.0)  # no azimuth is the mirror image of another one
 
     def evaluate(self, incident: npt.ArrayLike, scattered: npt.ArrayLike, *, wavelength: float | None = None) -> Array:
         assert wavelength is None

@@ -39,8 +39,6 @@ def tabled(form: BsdfFormat, bsdf: Tabulated) -> BsdfData:
     assert form.tabulate is not None
     with pytest.MonkeyPatch.context() as patch:
         coarsen(patch)
-        # Of incidence: no azimuth is the mirror image of another one.
-        patch.setattr("etendue.formats.bsdf.astm.TURN", 100.0)
         return form.tabulate(bsdf)
 
 

@@ -37,6 +37,7 @@ class Opal:
     name, isotropic, reflects, transmits, both_sides = "opal", True, True, True, True
     wavelengths: tuple[float, ...] = ()
     incidences = (0.0, 45.0, 65.0, 80.0)
+    turns = (0.0,)
 
     def evaluate(self, incident: npt.ArrayLike, scattered: npt.ArrayLike, *, wavelength: float | None = None) -> Array:
         assert wavelength is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -15,7 +16,7 @@ from etendue.description.files import Files
 from etendue.errors import ArgumentError
 from etendue.formats.bsdf import bsdf_format, read_bsdf_data, write_bsdf_data, write_bsdf_shares
 from etendue.formats.bsdf.bsdf_format import NO_ERRORS, BsdfFormat
-from etendue.quantities.bsdf_data import LEAN, BsdfData
+from etendue.quantities.bsdf_data import LEAN, NORMAL, BsdfData
 from etendue.quantities.report import Complaint
 from etendue.scatter.bsdf import WAVELENGTH, Bsdf, Side
 from etendue.scatter.errors import with_standard_errors
@@ -24,6 +25,7 @@ from etendue.scatter.members import components_of, parts_of, same_when_turned
 from etendue.scatter.models.finish import Finish, Record
 from etendue.scatter.share_tables import share_tables
 from etendue.scatter.table import BsdfTable
+from etendue.scatter.turns import LEAST, MOST, MOST_SLICES, TOLERANCE, Turns, turns_of
 
 INCIDENCES = (0.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 75.0, 80.0, 85.0)
 """Angles [°] at which a model is tabled, and a file that holds models alone."""
@@ -145,6 +147,23 @@ class _Asked:
         kinks = [grid["angle"] for grid in _grids(record) if "angle" in grid]
         self.angles = np.degrees(np.unique(np.concatenate([np.zeros(1), *kinks]))).round(9)
 
+    @functools.cached_property
+    def found_turns(self) -> Turns:
+        """Azimuths of incidence that a table asks for; 0 alone of an isotropic one."""
+        if self.isotropic:
+            return Turns((0.0,), 0.0)
+        table = self._bsdf.data.slices if isinstance(self._bsdf, BsdfTable) else ()
+        known = [one.phi - 180.0 for one in table if one.theta >= NORMAL]
+        ways = [way for way, is_there in ((False, self.reflects), (True, self.transmits)) if is_there]
+        each = len(self.incidences) * len(ways) * (2 - self.both_sides) * max(len(self.wavelengths), 1)
+        most = min(max(MOST_SLICES // max(each, 1), LEAST), MOST)
+        return turns_of(lambda i, s: self.evaluate(i, s, wavelength=self.colour), self.incidences, ways, known, most)
+
+    @property
+    def turns(self) -> tuple[float, ...]:
+        """As writers ask."""
+        return self.found_turns.azimuths
+
     @property
     def colour(self) -> float:
         """The wavelength [nm] of what is written without one: what a table does not know is that of the nearest."""
@@ -227,7 +246,7 @@ def _laid_out(bsdf: Bsdf, form: BsdfFormat) -> tuple[BsdfData, tuple[str, ...]]:
             lost.append("standard errors are known for a part of the light alone" if form.holds_errors else NO_ERRORS)
     if data.isotropic and not asked.isotropic:
         lost.append(f"only light from azimuth {data.slices[0].phi:g}° of an anisotropic sample is in the file")
-    lost += _colours(asked, data)
+    lost += [*_between_turns(asked), *_colours(asked, data)]
     if not asked.both_sides and len({one.front for one in data.slices}) == 1:
         lost.append("only light that meets the front is in the file, and reads as that of both sides")
     kept = {one.transmitted for one in data.slices}
@@ -263,6 +282,15 @@ def _regular(bsdf: Bsdf, asked: _Asked, form: BsdfFormat) -> tuple[list[dict[str
         return [], ["light that is mirrored or goes on in a single direction is not in the file"]
     last = asked.incidences[-1] if asked.reflects or asked.transmits else RIGHT_ANGLE
     return regular_of_any(bsdf, asked.angles, asked.colour, last)
+
+
+def _between_turns(asked: _Asked) -> list[str]:
+    """What is to be said of azimuths of incidence, if the format has asked for them."""
+    found = vars(asked).get("found_turns", Turns((), 0.0))
+    if found.off <= TOLERANCE:
+        return []
+    said = f"light from {len(found.azimuths)} azimuths is in the file, between which f is linear"
+    return [f"{said}: in the middle between two of them it is off by up to {found.off:.2g} of the light"]
 
 
 def _colours(asked: _Asked, data: BsdfData) -> list[str]:

@@ -27,7 +27,7 @@ ROUNDED = 1e-3
 """By which a whole turn, or half of one, may be more than that after rounding [rad]."""
 
 THETA = np.concatenate([np.arange(0.0, 80.0, 2.0), np.arange(80.0, 90.0, 1.0)])
-PHI_STEP, TURN = 5.0, 45.0
+PHI_STEP = 5.0
 """Directions of tables that are made to be written [°]."""
 
 
@@ -173,11 +173,10 @@ def _alike(colours: list[BsdfSlice]) -> bool:
 
 def tabulate(bsdf: Tabulated) -> BsdfData:
     """Light from both sides, or from the front if the back is alike; reflected and transmitted, at each known wavelength."""
-    turns = (0.0,) if bsdf.isotropic else tuple(np.arange(0.0, 360.0, TURN))
     slices = []
     for front in (True,) if bsdf.both_sides else (True, False):
         for transmitted, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)):
-            for turn in turns if is_there else ():
+            for turn in bsdf.turns if is_there else ():
                 for theta, wave in itertools.product(bsdf.incidences, bsdf.wavelengths or (None,)):
                     incident = light_from(theta, (180.0 + turn) % 360.0, behind=not front)
                     grid = PolarGrid("normal", THETA, np.arange(0.0, 360.0, PHI_STEP))

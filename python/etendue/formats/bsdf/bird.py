@@ -28,7 +28,7 @@ NANOMETRES = {"nm": 1.0, "μm": 1e3, "µm": 1e3, "um": 1e3}
 PER_STERADIAN = {"1/sr": 1.0, "sr^-1": 1.0}
 
 THETA = np.concatenate([np.arange(0.0, 80.0, 5.0), np.arange(80.0, 90.0, 3.0)])
-PHI_STEP, TURN = 10.0, 45.0
+PHI_STEP = 10.0
 """Directions of tables that are made to be written [°]."""
 
 
@@ -159,7 +159,7 @@ def fits(data: BsdfData) -> bool:
 def tabulate(bsdf: Tabulated) -> BsdfData:
     """Reflected light that meets the front, at each wavelength that is known."""
     slices = []
-    for turn in (0.0,) if bsdf.isotropic else tuple(np.arange(0.0, 360.0, TURN)):
+    for turn in bsdf.turns:
         for theta, wave in itertools.product(bsdf.incidences, bsdf.wavelengths or (None,)):
             incident = light_from(theta, (180.0 + turn) % 360.0)
             grid = PolarGrid("normal", THETA, np.arange(0.0, 360.0, PHI_STEP))

@@ -32,6 +32,11 @@ class Tabulated(Protocol):
     incidences: tuple[float, ...]
     """Angles [°] at which it is known, in order, or a fair choice of them for a model."""
 
+    @property
+    def turns(self) -> tuple[float, ...]:
+        """Azimuths [°] to where the light of a table goes, in order: 0 alone if it is isotropic."""
+        ...
+
     def evaluate(self, incident: npt.ArrayLike, scattered: npt.ArrayLike, *, wavelength: float | None = None) -> Array:
         """Return f [1/sr] for pairs of unit vectors, shapes (…, 3) that broadcast, in the frame of `bsdf_data`."""
         ...

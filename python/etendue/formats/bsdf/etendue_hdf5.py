@@ -89,7 +89,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
     radial = np.concatenate([[0.0], np.geomspace(1e-3, 2.0, 60)])
     grid = PolarGrid("cosines", radial, np.arange(0.0, 360.0, 5.0))
     ways = [way for way, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)) if is_there]
-    phis = (0.0,) if bsdf.isotropic else tuple(np.arange(0.0, 360.0, 22.5))
+    phis = (0.0,) if bsdf.isotropic else tuple((180.0 + turn) % 360.0 for turn in bsdf.turns)
     backs = (False,) if bsdf.both_sides else (False, True)
     colours: tuple[float | None, ...] = bsdf.wavelengths or (None,)
     for behind, way, phi, theta, colour in itertools.product(backs, ways, phis, bsdf.incidences, colours):

@@ -31,7 +31,7 @@ THETA = np.concatenate([np.arange(0.0, 80.0, 2.0), np.arange(80.0, 90.5, 1.0)])
 ALONG = 1e-7
 """Angle that stands for light along the surface, which is reflected or transmitted [°]."""
 
-PHI_STEP, TURN = 5.0, 45.0
+PHI_STEP = 5.0
 """Directions of tables that are made to be written [°]."""
 
 
@@ -161,11 +161,10 @@ def fits(data: BsdfData) -> bool:
 
 def tabulate(bsdf: Tabulated) -> BsdfData:
     """Light that meets the front, reflected and transmitted; along the surface as just above it."""
-    turns = (0.0,) if bsdf.isotropic else tuple(np.arange(0.0, 360.0, TURN))
     slices = []
     for transmitted, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)):
         radial = THETA[:-1] if transmitted else THETA
-        for turn, theta in itertools.product(turns if is_there else (), bsdf.incidences):
+        for turn, theta in itertools.product(bsdf.turns if is_there else (), bsdf.incidences):
             incident = light_from(theta, (180.0 + turn) % 360.0)
             grid = PolarGrid("normal", radial, np.arange(0.0, 360.0, PHI_STEP) + turn)
             scattered = direction(np.minimum(radial, 90.0 - ALONG)[None, :], grid.azimuth[:, None], behind=transmitted)

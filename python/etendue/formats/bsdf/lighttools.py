@@ -25,7 +25,7 @@ INCIDENT = 90.0
 RIGHT_ANGLE = 90.0
 
 THETA = np.concatenate([np.arange(0.0, 80.0, 2.0), np.arange(80.0, 90.5, 1.0)])
-PHI_STEP, TURN = 5.0, 45.0
+PHI_STEP = 5.0
 """Directions of tables that are made to be written [°]."""
 
 SYMMETRIES = ("PlaneSymmetrical", "Asymmetric", "Asymmetrical")
@@ -180,12 +180,11 @@ def fits(data: BsdfData) -> bool:
 
 def tabulate(bsdf: Tabulated) -> BsdfData:
     """Light from both sides, or from the front if the back is alike; reflected and transmitted, at each known wavelength."""
-    turns = (0.0,) if bsdf.isotropic else tuple(np.arange(0.0, 360.0, TURN))
     grid = PolarGrid("normal", THETA, np.arange(0.0, 360.0, PHI_STEP))
     slices = []
     for front in (True,) if bsdf.both_sides else (True, False):
         for transmitted, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)):
-            for turn in turns if is_there else ():
+            for turn in bsdf.turns if is_there else ():
                 for theta, wave in itertools.product(bsdf.incidences, bsdf.wavelengths or (None,)):
                     incident = light_from(theta, (INCIDENT + turn) % 360.0, behind=not front)
                     # Along the surface, where a BSDF may have no value: just above it.

@@ -26,7 +26,7 @@ START = "OPTIS - Anisotropic BSDF surface file"
 THETA = np.concatenate([np.arange(0.0, 80.0, 2.0), np.arange(80.0, 90.5, 1.0)])
 """Angles from the normal [°] of tables that are made to be written."""
 
-PHI_STEP, TURN = 5.0, 45.0
+PHI_STEP = 5.0
 """Steps of the azimuth of scattered light and of the anisotropy angle [°]."""
 
 WAYS = ("reflection", "transmission")
@@ -208,10 +208,9 @@ def fits(data: BsdfData) -> bool:
 
 def tabulate(bsdf: Tabulated) -> BsdfData:
     """Light that meets the front, reflected and transmitted."""
-    turns = (0.0,) if bsdf.isotropic else tuple(np.arange(0.0, 360.0, TURN))
     slices = []
     for transmitted, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)):
-        for turn in turns if is_there else ():
+        for turn in bsdf.turns if is_there else ():
             for theta in bsdf.incidences:
                 incident = light_from(theta, 180.0 + turn)
                 grid = PolarGrid("normal", THETA, np.arange(0.0, 360.0, PHI_STEP) + turn)

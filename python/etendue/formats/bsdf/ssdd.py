@@ -361,7 +361,7 @@ def tabulate(bsdf: Tabulated) -> BsdfData:
     grid = PolarGrid("specular", RADIAL, np.arange(0.0, 360.0, AZIMUTH_STEP))
     slices = []
     for transmitted, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)):
-        for turn in ((0.0,) if bsdf.isotropic else tuple(np.arange(0.0, 360.0, TURN))) if is_there else ():
+        for turn in bsdf.turns if is_there else ():
             for theta in bsdf.incidences:
                 incident = light_from(theta, turn)
                 values = values_on(grid, bsdf, incident, transmitted=transmitted)

@@ -46,7 +46,7 @@ READ_COATINGS = (BARE, 1, 4, TWO_SIDED)
 WAYS = ("reflected", "transmitted")
 
 BETA = np.concatenate([[0.0], np.geomspace(0.005, 2.0, 60)])
-AZIMUTH_STEP, TURN = 10.0, 45.0
+AZIMUTH_STEP = 10.0
 """Of tables that are made to be written: |β − β₀|, and steps of azimuths [°]."""
 
 
@@ -269,11 +269,10 @@ def _complete(slices: Sequence[BsdfSlice]) -> bool:
 
 def tabulate(bsdf: Tabulated) -> BsdfData:
     """Light from both sides, or from the front if the back is alike; reflected and transmitted, on the same grid."""
-    turns = (0.0,) if bsdf.isotropic else tuple(np.arange(0.0, 360.0, TURN))
     slices = []
     for front in (True,) if bsdf.both_sides else (True, False):
         for transmitted, is_there in ((False, bsdf.reflects), (True, bsdf.transmits)):
-            for turn, theta in itertools.product(turns if is_there else (), bsdf.incidences):
+            for turn, theta in itertools.product(bsdf.turns if is_there else (), bsdf.incidences):
                 if theta < NORMAL and turn:
                     continue  # light along the normal comes from no azimuth
                 light = (180.0 + turn) % 360.0
