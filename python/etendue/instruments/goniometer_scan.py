@@ -16,6 +16,7 @@ from etendue.formats.input import as_path
 from etendue.formats.output import atomic_output
 from etendue.formats.scans_csv import DIRECTIONS, ERROR, POSITIONS, read_columns, read_remarks
 from etendue.instruments.positions import Plane, detector_directions
+from etendue.instruments.ring_sum import sum_of_rings
 from etendue.quantities.bsdf_data import light_from
 from etendue.scatter.scans.scans import Scans
 
@@ -210,11 +211,16 @@ class GoniometerScan:
 
     @property
     def total_scatter(self) -> float:
-        """Total integrated scatter of a lobe that is round about the regular direction: eq. 5.2, both sides averaged.
+        """Total integrated scatter of a lobe that is alike all around the regular direction in direction cosines.
 
+        At normal incidence eq. 5.2, both sides averaged; at others see `sum_of_rings`. One scan cannot tell what the lobe is
+        like elsewhere: one that is round in the angle gives up to 1/cosθ times its light, a lobe wider one way less or more.
         Cubic between the positions. Needs the solid angle.
         """
-        return total_scatter(self.angle - self.regular, self.bsdf * self.cosine)
+        values = self.bsdf * self.cosine
+        if not self.sample:
+            return total_scatter(self.angle, values)
+        return sum_of_rings(self.angle, lambda at: cubic(self.angle, values, at), self.incidence, self.plane)
 
     def scans(self) -> Scans:
         """The same as values at pairs of directions, for `Bsdf.from_scans`; light comes from azimuth 180°.
