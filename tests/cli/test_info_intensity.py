@@ -58,3 +58,13 @@ def test_one_of_several_photometries(run: Run) -> None:
     refused = run("info", "led.tm25ray", "--photometry", "q")
     assert refused.status == 1
     assert "--photometry is for intensity files" in refused.err
+
+
+@pytest.mark.parametrize("name", ["lamp.ies", "lamp.ldt"])
+def test_a_power_of_0_is_none_that_was_measured(run: Run, name: str) -> None:
+    """The files have a place for it that has to be filled."""
+    led = lid("none")
+    for power, told in ((0.0, "not stated"), (12.5, "12.5 W")):
+        et.write_intensity(name, led.replace(luminaire={"input_power": power}))
+        assert f"input power: {told}\n" in run("intensity", name).out
+        assert run("info", name, "--json").json[0]["luminaire"]["input_power"] == (power or None)

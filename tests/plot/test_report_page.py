@@ -120,6 +120,37 @@ def test_the_page_of_paper_is_whole(report: SourceReport, *, crowded: bool) -> N
 
 
 @pytest.mark.slow
+def test_fluxes_of_zones_have_their_errors(report: SourceReport) -> None:
+    """On both pages what `zonal_flux` gives, to the digits that are shown: two of the error's."""
+    edges = np.arange(0.0, 181.0, 10.0)
+    rows = zip(edges, edges[1:], *et.zonal_flux(report.intensity, edges), strict=False)
+    zones = [row for row in rows if row[2] > 1e-4 * report.intensity.flux]
+    paper = [text.get_text() for text in et.plot_report(report).texts]
+    (heading,) = [number for number, text in enumerate(paper) if text == "Flux by zones of γ [lm]"]
+    told = re.findall(r"γ (\d+)° to (\d+)°</th><td>([\d.]+) ± ([\d.]+) lm", report_html(report))
+    assert len(zones) > 5
+    for number, ((low, high, flux, error), found) in enumerate(zip(zones, told, strict=False)):
+        where, figures = paper[heading + 1 + 2 * number : heading + 3 + 2 * number]
+        assert where == f"{low:g}–{high:g}°"
+        assert (float(found[0]), float(found[1])) == (low, high)
+        for value, its_error in (found[2:], figures.split(" ± ")):
+            assert float(its_error) == pytest.approx(error, rel=0.06)
+            assert float(value) == pytest.approx(flux, abs=0.06 * error)
+
+
+@pytest.mark.slow
+def test_a_long_title_stays_on_the_page(report: SourceReport) -> None:
+    """Beside the subtitle at the right margin, its middle left out."""
+    figure = et.plot_report(dataclasses.replace(report, title="a lamp of many words " * 8))
+    figure.canvas.draw()
+    title, subtitle = (text.get_window_extent() for text in figure.texts[:2])
+    assert "…" in figure.texts[0].get_text()
+    assert title.x1 < subtitle.x0
+    short = et.plot_report(dataclasses.replace(report, title="my lamp"))
+    assert short.texts[0].get_text() == "my lamp"
+
+
+@pytest.mark.slow
 def test_files_repeat_their_bytes_and_unknown_ones_are_told(report: SourceReport, tmp_path: Path) -> None:
     for suffix in PAGE_TYPES:
         for name in ("a", "b"):

@@ -33,15 +33,23 @@ def describe_intensity(distribution: Intensity) -> dict[str, Any]:
         "gammas": distribution.gamma.size,
         "gamma_range": [float(distribution.gamma[0]), float(distribution.gamma[-1])],
         "data_sheet": data_sheet(distribution).to_dict(),
-        "luminaire": {name: _plain(fact) for name, fact in distribution.luminaire.items()},
+        "luminaire": {name: _plain(name, fact) for name, fact in distribution.luminaire.items()},
         "notes": list(distribution.notes),
     }
 
 
-def _plain(fact: Any) -> Any:
-    return (
-        {"wavelength": fact.wavelength.tolist(), "weight": fact.weight.tolist()} if isinstance(fact, Spectrum) else fact
-    )
+UNSTATED_AS_0 = frozenset({"input_power"})
+"""Facts for which files have a place that has to be filled, with 0 where nothing is stated: no lamp takes 0 W."""
+
+
+def _stated(name: str, fact: Any) -> bool:
+    return not (name in UNSTATED_AS_0 and fact == 0)
+
+
+def _plain(name: str, fact: Any) -> Any:
+    if isinstance(fact, Spectrum):
+        return {"wavelength": fact.wavelength.tolist(), "weight": fact.weight.tolist()}
+    return fact if _stated(name, fact) else None
 
 
 def print_intensity(distribution: Intensity) -> None:
@@ -62,6 +70,7 @@ def print_intensity(distribution: Intensity) -> None:
         elif name not in {"keywords", "lamp_sets", "tilt"}:
             text = f"{value:.7g}" if isinstance(value, float) else str(value)
             unit = re.search(r"\[(\w+)\]", LUMINAIRE_FACTS[name])
-            say(f"  {name.replace('_', ' ')}: {text[:100]}{f' {unit[1]}' if unit else ''}")
+            told = f"{text[:100]}{f' {unit[1]}' if unit else ''}" if _stated(name, value) else "not stated"
+            say(f"  {name.replace('_', ' ')}: {told}")
     for note in distribution.notes:
         say(f"  {note}")

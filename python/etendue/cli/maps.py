@@ -115,6 +115,7 @@ def _print_regions(lmap: AnyMap, regions: Sequence[AnyRegion]) -> None:
             f"  region {number}: mean {measured(found.mean, mean_error, found.unit)}, "
             f"minimum {counted(found.minimum, found.unit)}, maximum {counted(found.maximum, found.unit)}, "
             f"minimum over mean {found.uniformity:.3g}"
+            + "".join(f"; {note}" for note in found.notes)
             + (f"; {found.dead_pixels} of {found.pixels} pixels are dead and count as 0" if found.dead_pixels else "")
         )
 

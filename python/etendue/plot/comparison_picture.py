@@ -15,7 +15,8 @@ from etendue.errors import UnknownNameError
 from etendue.luminance.comparison import Comparison
 from etendue.plot import style
 from etendue.plot.colour_scale import Scale, choose_scale, colour_map, normalisation, signed_normalisation
-from etendue.plot.map_picture import axis_names, bar_beside, draw_colour_bar, draw_screen, picture_within
+from etendue.plot.map_picture import NARROWEST, axis_names, bar_beside, draw_colour_bar, draw_screen, picture_within
+from etendue.plot.region_marks import draw_outline
 from etendue.quantities.observer import Screen
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def plot_comparison(
     -------
     matplotlib.figure.Figure or tuple of matplotlib.axes.Axes
         The figure, not registered with pyplot; or the axes of `ax`. The region compared is outlined, the difference is
-        grey outside it.
+        grey outside it, and where both maps are dead; the lines below say how many pixels are.
 
     Raises
     ------
@@ -144,7 +145,8 @@ def plot_comparison(
             style.put_title(axes, name)
             draw_colour_bar(image, data, *label, bar_beside(axes, reference.screen))
         return given
-    layout = _Layout.around(reference.screen)
+    lines = [*_figures(comparison, labels, chosen.why), *_grey(comparison, shown.data)]
+    layout = _Layout.around(reference.screen, len(lines))
     figure = style.new_figure(layout.width, layout.height)
     panels = [style.add_axes(figure, *place) for place in layout.panels]
     drawn = _draw_panels(panels, comparison, chosen.name, shown, cmap, layout.panels[0][2:], names)
@@ -152,7 +154,8 @@ def plot_comparison(
     for (image, data, label), place in zip(drawn[1:], layout.bars, strict=True):
         draw_colour_bar(image, data, *label, style.add_axes(figure, *place))
     for axes, name in zip(panels, (*labels, shown.title), strict=True):
-        axes.set_title(_shortened(name, layout.pitch), loc="left", size=style.LABEL_SIZE, color=style.INK, pad=4)
+        short = style.shortened(name, int(11.0 * layout.pitch))
+        axes.set_title(short, loc="left", size=style.LABEL_SIZE, color=style.INK, pad=4)
     for axes in panels[1:]:
         axes.set_yticklabels([])
         axes.set_ylabel("")
@@ -161,7 +164,7 @@ def plot_comparison(
     style.add_text(figure, left, top - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
     seen = f"seen at {style.describe_observer(reference.observer)}"
     style.add_text(figure, left, top - 0.54, seen, size=style.LABEL_SIZE, color=style.FAINT)
-    for number, line in enumerate(reversed(_figures(comparison, labels, chosen.why))):
+    for number, line in enumerate(reversed(lines)):
         style.add_text(figure, left, 0.14 + 0.16 * number, line, size=style.TICK_SIZE, color=style.FAINT)
     return style.finish(figure, path)
 
@@ -177,8 +180,10 @@ class _Shown(NamedTuple):
 
 
 def _shown(comparison: Comparison, difference: str, labels: tuple[str, str]) -> _Shown:
+    # A pixel that is dead in both maps counts as 0 in both, or not at all: nobody knows of a difference.
+    unknown = _dead(comparison).all(axis=0)
     if difference == "thesis":
-        data = comparison.difference
+        data = np.where(unknown, np.nan, comparison.difference)
         defined = data[~np.isnan(data)]
         end = float(np.percentile(defined, 99)) if defined.size else 0.0
         norm = normalisation(data, "linear", 0.0, end if end > 0.0 else GREATEST_DIFFERENCE)
@@ -186,22 +191,41 @@ def _shown(comparison: Comparison, difference: str, labels: tuple[str, str]) -> 
     plain = labels == ("test", "reference")
     title = "test − reference" if plain else "first − second"
     if difference == "sigma":
-        data = comparison.difference_in_sigma
+        data = np.where(unknown, np.nan, comparison.difference_in_sigma)
         return _Shown(data, signed_normalisation(data, 1.0), "difference", title, ("difference", "standard errors"))
-    data = comparison.signed_difference
+    data = np.where(unknown, np.nan, comparison.signed_difference)
     return _Shown(data, signed_normalisation(data, 1.0), "difference", title, ("difference", "% of max"))
+
+
+def _dead(comparison: Comparison) -> npt.NDArray[np.bool_]:
+    """Where the maps are dead, shape (2, rows, columns)."""
+    return np.isnan(np.stack((comparison.test.values, comparison.reference.values)))
+
+
+def _grey(comparison: Comparison, data: Array) -> list[str]:
+    """What is grey in the third panel, and what of the dead pixels is not, as lines of the caption."""
+    dead, shown = _dead(comparison), ~np.isnan(data)
+    region = comparison.region
+    inside = np.ones(data.shape, np.bool_) if region is None else region.mask(comparison.reference.screen)
+    left = inside & ~shown
+    reasons = (
+        (inside & dead.all(axis=0), "dead in both maps"),
+        (left & (dead.sum(axis=0) == 1), "dead in one of them"),
+        (left & ~dead.any(axis=0), "without a difference that is known"),
+        (~inside, "outside the region"),
+    )
+    found = [f"{style.grouped(str(int(which.sum())))} pixels {words}" for which, words in reasons if which.any()]
+    facts = [f"grey: {found[0]}", *found[1:]] if found else []
+    as_black = int((shown & (dead.sum(axis=0) == 1)).sum())
+    counted = f"{style.grouped(str(as_black))} pixels are dead in one of the maps and count as 0 there"
+    return style.wrapped([*facts, *([counted] if as_black else [])], 3 * NARROWEST_COLUMN)
 
 
 def _heading(comparison: Comparison) -> str:
     one, other = (Path(lmap.provenance.source).name for lmap in (comparison.test, comparison.reference))
     what = f"{comparison.reference.quantity.capitalize()} compared"
-    return style.headed(what, one, 6.0) if one == other else f"{_shortened(one, 3.0)} against {_shortened(other, 3.0)}"
-
-
-def _shortened(name: str, inches: float) -> str:
-    """A name that has so much room, its middle left out if it must be."""
-    room = max(8, int(inches * 11.0))
-    return name if len(name) <= room else f"{name[: room // 2 - 1]}…{name[-(room // 2) :]}"
+    both = f"{style.shortened(one, 33)} against {style.shortened(other, 33)}"
+    return style.headed(what, one, 6.0) if one == other else both
 
 
 def _draw_panels(
@@ -236,11 +260,8 @@ def _draw_panels(
 
 def _outline(axes: Axes, comparison: Comparison) -> None:
     """The region compared."""
-    from matplotlib.patches import Polygon
-
-    region = comparison.region
-    if region is not None:
-        axes.add_patch(Polygon(np.array(region.corners), closed=True, fill=False, edgecolor="white", linewidth=1.0))
+    if comparison.region is not None:
+        draw_outline(axes, np.array(comparison.region.corners))
 
 
 def _figures(comparison: Comparison, labels: tuple[str, str], why: str) -> list[str]:
@@ -280,12 +301,14 @@ class _Layout(NamedTuple):
     pitch: float
 
     @classmethod
-    def around(cls, screen: Screen) -> _Layout:
+    def around(cls, screen: Screen, lines: int) -> _Layout:
+        """Three maps of this screen above so many lines of text."""
         aspect = screen.width / screen.height
         # Beyond these limits the pixels are drawn out of proportion rather than invisibly thin.
-        wide = float(np.clip(4.2 * aspect, 0.4, 3.1))
+        wide = float(np.clip(4.2 * aspect, NARROWEST, 3.1))
         high = float(np.clip(wide / aspect, 0.3, 4.2))
-        left, gap, bottom, top, bar = 0.7, 0.18, 1.98, 0.98, 0.72
+        # Numbers at the ends of neighbouring axes need the gap.
+        left, gap, bottom, top, bar = 0.7, 0.34, 1.34 + 0.16 * lines, 0.98, 0.72
         pitch = max(wide + gap, NARROWEST_COLUMN)
         panels = [(left + column * pitch, bottom, wide, high) for column in range(3)]
         under = bottom - bar

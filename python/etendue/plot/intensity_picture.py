@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 from collections.abc import Iterator
@@ -225,8 +226,8 @@ def _polar(axes: Axes, curves: list[_Curve], names: tuple[str, str], reach: floa
     axes.set_xlim(-1.16 * rim, 1.16 * rim)
     axes.set_ylim(-1.12 * rim, 1.12 * rim if reach > 90.0 else 0.12 * rim)
     arc = np.radians(np.linspace(-reach, reach, 361))
-    # A number takes some 0.4 inches: on small diagrams every second or third circle has one.
-    every = math.ceil(0.4 * circles.size / (min(style.inches_of(axes)) / 2.3))
+    wide, high = style.inches_of(axes)
+    every = _labelled(circles, names[1], min(wide / 2.32, high / (2.24 if reach > 90.0 else 1.24)))
     for number, radius in enumerate(circles[::-1]):
         axes.plot(
             radius * np.sin(arc),
@@ -279,6 +280,23 @@ def _polar(axes: Axes, curves: list[_Curve], names: tuple[str, str], reach: floa
                 side * 1.14 * rim, -1.1 * rim, ", ".join(side_names[which] for side_names in sides),
                 size=style.TICK_SIZE, color=style.FAINT, ha="left" if side < 0 else "right", va="bottom",
             )  # fmt: skip
+
+
+def _labelled(circles: Array, unit: str, inches: float) -> int:
+    """Every how many circles, from the outermost, which has the unit, there is room for a number; of this radius [inches].
+
+    >>> _labelled(np.array([1.0, 2.0, 3.0, 4.0]), "cd", 1.8), _labelled(np.array([1e4, 2e4, 3e4, 4e4]), "cd", 0.9)
+    (1, 3)
+    """
+    widths = [style.width_of(style.plain(radius)) for radius in circles[::-1]]
+    widths[0] += style.width_of(f" {unit}")
+    places = inches * circles[::-1] / circles[-1]
+    for every in range(1, circles.size):
+        shown = list(zip(places, widths, strict=True))[::every]
+        # The first of a pair is the outer one.
+        if all(a - b > (w + v) / 2 + style.LETTER for (a, w), (b, v) in itertools.pairwise(shown)):
+            return every
+    return int(circles.size)
 
 
 def _circles(top: float) -> Array:

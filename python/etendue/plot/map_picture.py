@@ -227,6 +227,9 @@ def _write_why_dark(axes: Axes, lmap: LuminanceMap | IlluminanceMap) -> None:
     axes.text(0.5, 0.5, message, transform=axes.transAxes, ha="center", va="center", color="white", size=9)
 
 
+NARROWEST = 0.5
+"""Width of a picture [inches] on which its numbers have room."""
+
 NARROW = 1.6
 """Length of an axis [inches] on which there is no room for more than the first word of its name."""
 
@@ -260,6 +263,8 @@ def draw_screen(
         (axes.xaxis, axes.yaxis), inches, names, (screen.width, screen.height), strict=True
     ):
         axis.set_major_locator(style.locator_for(length))
+        if axis is axes.xaxis:
+            style.keep_apart(axis, length, -size / 2, size / 2)
         style.put_numbers(axis, name if length >= NARROW else name.split()[0], "mm", -size / 2, size / 2)
     return image
 
@@ -385,7 +390,7 @@ class MapLayout(NamedTuple):
         aspect = screen.width / screen.height
         lying = aspect > 2.0
         # Beyond these limits the pixels are drawn out of proportion rather than invisibly thin.
-        wide = 7.2 if lying else float(np.clip(4.6 * aspect, 0.3, 5.0))
+        wide = 7.2 if lying else float(np.clip(4.6 * aspect, NARROWEST, 5.0))
         high = float(np.clip(wide / aspect, 0.3, 5.2))
         left, right, bottom, top = 0.72, 0.2, 0.62, 0.78
         gap, thick, room = 0.14, 0.15, 0.85

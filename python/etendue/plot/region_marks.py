@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -86,19 +86,84 @@ def _facts(number: int, figures: RegionStatistics) -> Iterator[str]:
     yield ", ".join(f"{share:g} %: {told(value)}" for share, value in figures.percentiles)
 
 
+ROOM = 12.0
+"""Sides of a number with its halo [points]."""
+
+
 def draw_marks(axes: Axes, marks: Sequence[Mark]) -> None:
-    """Outlines that are seen on bright and on dark, each with its number at its upper left corner."""
-    from matplotlib.patches import Polygon
+    """Outlines that are seen on bright and on dark, each with its number at the upper left of what is seen of it.
+
+    Numbers that would lie on each other, those of equal outlines among them, stand side by side.
+    """
+    frame = (*sorted(axes.get_xlim()), *sorted(axes.get_ylim()))
+    left, right, bottom, top = frame
+    points = 72.0 / style.figure_of(axes).dpi
+    places: list[tuple[Array, Array, list[int]]] = []
+    for mark in marks:
+        draw_outline(axes, mark.outline)
+        seen = clipped(mark.outline, frame)
+        corners = (seen if len(seen) else mark.outline).clip((left, bottom), (right, top))
+        corner = corners[np.argmax(corners[:, 1] - corners[:, 0])]
+        dot = points * np.asarray(axes.transData.transform(corner))
+        for _, other, numbers in places:
+            if np.abs(other - dot).max() < ROOM:
+                numbers.append(mark.number)
+                break
+        else:
+            places.append((corner, dot, [mark.number]))
+    edges = axes.get_window_extent()
+    for corner, (x, y), numbers in places:
+        # At the right and at the lower edge there is room on the other side only.
+        ends, low = x + ROOM * len(numbers) > points * edges.x1, y - ROOM < points * edges.y0
+        axes.annotate(
+            ", ".join(map(str, numbers)), corner, xytext=(-3 if ends else 3, 3 if low else -3), textcoords="offset points",
+            ha="right" if ends else "left", va="bottom" if low else "top", size=style.TICK_SIZE, color="white",
+            weight="bold", path_effects=halo(), annotation_clip=False,
+        )  # fmt: skip
+
+
+def halo() -> list[Any]:
+    """Black around thin white lines and letters, which are seen on bright and on dark."""
     from matplotlib.patheffects import withStroke
 
-    for mark in marks:
-        # Thin white on wider black.
-        halo = [withStroke(linewidth=2.2, foreground="black")]
-        axes.add_patch(
-            Polygon(mark.outline, closed=True, fill=False, edgecolor="white", linewidth=0.9, path_effects=halo)
-        )
-        corner = mark.outline[np.argmax(mark.outline[:, 1] - mark.outline[:, 0])]
-        axes.annotate(
-            str(mark.number), corner, xytext=(3, -3), textcoords="offset points", ha="left", va="top",
-            size=style.TICK_SIZE, color="white", weight="bold", path_effects=halo, annotation_clip=True,
-        )  # fmt: skip
+    return [withStroke(linewidth=2.2, foreground="black")]
+
+
+def draw_outline(axes: Axes, corners: Array) -> None:
+    """The outline of a region, corners of shape (n, 2) [mm]."""
+    from matplotlib.patches import Polygon
+
+    axes.add_patch(Polygon(corners, closed=True, fill=False, edgecolor="white", linewidth=0.9, path_effects=halo()))
+
+
+def clipped(corners: Array, frame: tuple[float, float, float, float]) -> Array:
+    """The part of a polygon that lies in a rectangle: cut off side by side (Sutherland and Hodgman).
+
+    Parameters
+    ----------
+    corners : array, shape (n, 2)
+        Of the polygon, in order.
+    frame : tuple
+        Left, right, bottom, top, in the unit of the corners.
+
+    Returns
+    -------
+    array, shape (m, 2)
+        Empty if no part does.
+
+    Examples
+    --------
+    >>> clipped(np.array([(0.0, 0), (4, 0), (0, 4)]), (1.0, 9.0, 1.0, 9.0)).tolist()
+    [[1.0, 1.0], [3.0, 1.0], [1.0, 3.0]]
+    """
+    left, right, bottom, top = frame
+    for axis, sign, limit in ((0, 1.0, left), (0, -1.0, right), (1, 1.0, bottom), (1, -1.0, top)):
+        kept: list[Array] = []
+        for before, here in zip(np.roll(corners, 1, axis=0), corners, strict=True):
+            a, b = (sign * (float(end[axis]) - limit) for end in (before, here))
+            if (a < 0.0) != (b < 0.0):
+                kept.append(before + (here - before) * a / (a - b))
+            if b >= 0.0:
+                kept.append(here)
+        corners = np.array(kept).reshape(-1, 2)
+    return corners

@@ -20,6 +20,7 @@ from etendue.plot import style
 from etendue.plot.colour_scale import choose_scale, colour_map, normalisation
 from etendue.plot.intensity_picture import plot_intensity
 from etendue.plot.map_picture import axis_names, draw_colour_bar, draw_screen, plot_map
+from etendue.quantities.measured import measured
 from etendue.quantities.observer import Observer
 from etendue.quantities.printable import printable
 
@@ -31,6 +32,10 @@ A4 = (8.27, 11.69)
 
 MARGIN = 0.55
 LINE = 0.145
+
+HEADING = 14.0
+"""Size of the type of the title."""
+
 SIDE = 1.42
 """Of the picture of a map [inches]."""
 
@@ -88,7 +93,9 @@ def plot_report(report: SourceReport, path: str | os.PathLike[str] | None = None
         raise UnknownNameError("extension of a report", suffix, PAGE_TYPES)
     figure = style.new_figure(*A4)
     y = A4[1] - 0.62
-    style.add_text(figure, MARGIN, y, report.title, size=14, color=style.INK, weight="bold")
+    room = A4[0] - 2 * MARGIN - style.width_of(report.subtitle, style.LABEL_SIZE) - 0.2
+    title = style.shortened(report.title, int(room / style.width_of("0", 1.15 * HEADING)))
+    style.add_text(figure, MARGIN, y, title, size=HEADING, color=style.INK, weight="bold")
     style.add_text(figure, A4[0] - MARGIN, y, report.subtitle, size=style.LABEL_SIZE, color=style.FAINT, ha="right")
     y = min(_write_facts(figure, report, y - 0.3), _write_words(figure, report, y - 0.3)) - 0.2
     y = _draw_maps(figure, report, y)
@@ -214,18 +221,19 @@ def _draw_intensity(figure: Figure, report: SourceReport, y: float) -> None:
     x = A4[0] / 2 + 0.2
     words = [line for text in report.sheet.lines() for line in style.wrapped([text], half - 0.2)]
     y = _lines(figure, x, _heading(figure, x, y - 0.22, "As a data sheet has it"), words) - 0.5 * LINE
-    unit = report.intensity.flux_unit
-    y = _heading(figure, x, y, "Flux by zones of γ")
+    y = _heading(figure, x, y, f"Flux by zones of γ [{report.intensity.flux_unit}]")
     # Of the rest a page of HTML tells.
     least = LEAST * report.intensity.flux
     zones = [
-        (f"{low:g}° to {high:g}°", f"{flux:.3g} {unit}") for low, high, flux, _ in report.sheet.zones if flux > least
+        (f"{low:g}–{high:g}°", measured(flux, error, "").rstrip())
+        for low, high, flux, error in report.sheet.zones
+        if flux > least
     ]
     for number, (where, flux_text) in enumerate(zones):
         column, row = divmod(number, math.ceil(len(zones) / 3))
-        place = x + 1.26 * column
+        place = x + 1.21 * column
         style.add_text(figure, place, y - row * LINE, where, size=style.CAPTION_SIZE - 1, color=style.FAINT)
-        style.add_text(figure, place + 0.6, y - row * LINE, flux_text, size=style.CAPTION_SIZE - 1, color=style.INK)
+        style.add_text(figure, place + 0.46, y - row * LINE, flux_text, size=style.CAPTION_SIZE - 1, color=style.INK)
 
 
 def _write_end(figure: Figure, report: SourceReport) -> None:
@@ -290,7 +298,11 @@ def _body(report: SourceReport) -> Iterator[str]:
     what = report.intensity.quantity.capitalize()
     yield f"<h2>{what}</h2>{_picture(plot_intensity(report.intensity), what)}" + _list(report.sheet.lines())
     unit = report.intensity.flux_unit
-    zones = [(f"γ {low:g}° to {high:g}°", f"{flux:.4g} {unit}") for low, high, flux, _ in report.sheet.zones if flux]
+    zones = [
+        (f"γ {low:g}° to {high:g}°", measured(flux, error, unit))
+        for low, high, flux, error in report.sheet.zones
+        if flux
+    ]
     yield "<h2>Flux by zones</h2>" + _table(zones)
     yield "<h2>Notes</h2>" + _list(report.notes)
     yield "<h2>Provenance</h2>" + _table(report.provenance)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 import re
@@ -188,6 +189,42 @@ def locator_for(inches: float) -> MaxNLocator:
     return MaxNLocator(int(min(7, max(1, inches * 1.8))), steps=[1, 2, 2.5, 5, 10])
 
 
+LETTER = 0.062
+"""Width of a digit at an axis [inches]: 0.56 of the size of its type."""
+
+
+def width_of(text: str, size: float = TICK_SIZE) -> float:
+    """About how wide a number is [inches].
+
+    Examples
+    --------
+    >>> round(width_of("−20"), 2), round(width_of("−20", 4.0), 2)
+    (0.19, 0.09)
+    """
+    return len(text) * LETTER * size / TICK_SIZE
+
+
+def keep_apart(axis: Axis, inches: float, low: float, high: float) -> None:
+    """Where the ticks of a horizontal axis of this length would run into each other, take the outermost two, or one."""
+    from matplotlib.ticker import FixedLocator
+
+    # Rounding puts no tick beyond the end.
+    slack = 1e-9 * (high - low)
+    ticks = [
+        float(tick) for tick in axis.get_major_locator().tick_values(low, high) if low - slack <= tick <= high + slack
+    ]
+    scale = 10.0 ** common_power(low, high)
+    # All have as many decimals as the one that needs most.
+    decimals = max((len(plain(tick / scale).partition(".")[2]) for tick in ticks), default=0)
+    while len(ticks) > 1:
+        widths = [width_of(f"{tick / scale:.{decimals}f}") for tick in ticks]
+        apart = [(b - a) * inches / (high - low) for a, b in itertools.pairwise(ticks)]
+        if all(gap > (a + b) / 2 + LETTER for gap, (a, b) in zip(apart, itertools.pairwise(widths), strict=True)):
+            return
+        ticks = [ticks[0], ticks[-1]] if len(ticks) > 2 else ticks[1:]
+        axis.set_major_locator(FixedLocator(ticks))
+
+
 def put_numbers(axis: Axis, name: str, unit: str, low: float, high: float) -> None:
     """The label of an axis with its unit, and its ticks: plain numbers, of tiny or huge ones a power of ten in the unit."""
     power = common_power(low, high)
@@ -294,6 +331,18 @@ def headed(what: str, source: str, inches: float = 4.4) -> str:
         return what
     half = (room - 1) // 2
     return f"{what} of {name if len(name) <= room else name[:half] + '…' + name[-half:]}"
+
+
+def shortened(name: str, letters: int) -> str:
+    """A name that has room for so many letters (eight at least), its middle left out if it must be.
+
+    Examples
+    --------
+    >>> shortened("lamp.tm25ray", 12), shortened("a-lamp-of-1200-lm.tm25ray", 12)
+    ('lamp.tm25ray', 'a-lam…m25ray')
+    """
+    room = max(8, letters)
+    return name if len(name) <= room else f"{name[: room // 2 - 1]}…{name[-(room // 2) :]}"
 
 
 def wrapped(facts: Iterable[str], inches: float) -> list[str]:

@@ -1,0 +1,87 @@
+"""Numbers at axes and circles do not run into each other: by the boxes that the renderer draws."""
+
+from __future__ import annotations
+
+import itertools
+
+import etendue as et
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+
+
+def a_map(*, width: float, height: float) -> et.LuminanceMap:
+    screen = et.Screen(width, height, 4, 6)
+    values = np.arange(1.0, 25.0).reshape(6, 4)
+    return et.LuminanceMap(values, 0.1 * values, np.full((6, 4), 100), et.Observer(0, 0, 1000), screen)
+
+
+def boxes(texts: list[Text], figure: Figure) -> list[Bbox]:
+    """Of what is drawn, in order from the left."""
+    figure.canvas.draw()
+    found = [text.get_window_extent() for text in texts if text.get_text() and text.get_visible()]
+    return sorted(found, key=lambda box: box.x0)
+
+
+def numbers_below(figure: Figure, panels: list[Axes]) -> list[Bbox]:
+    figure.canvas.draw()
+    texts = []
+    for axes in panels:
+        low, high = axes.get_xlim()
+        ticks = zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
+        texts += [label for tick, label in ticks if low <= tick <= high]
+    return boxes(texts, figure)
+
+
+SIZES = [
+    (4, 120),
+    (40, 120),
+    (400, 12000),
+    (12.5, 500),
+    (0.5, 6),
+    (2000, 90000),
+    (40, 40),
+    (200, 200),
+    (7, 90),
+    (3000, 20),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("width", "height"), SIZES)
+def test_numbers_below_maps(width: float, height: float) -> None:
+    figure = et.plot_map(a_map(width=width, height=height))
+    found = numbers_below(figure, figure.axes[:1])
+    assert len(found) > 1
+    assert all(a.x1 < b.x0 for a, b in itertools.pairwise(found))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("width", "height"), SIZES)
+def test_numbers_below_three_maps(width: float, height: float) -> None:
+    """Those of neighbouring panels neither."""
+    lmap = a_map(width=width, height=height)
+    figure = et.plot_comparison(et.compare(lmap, lmap))
+    found = numbers_below(figure, figure.axes[:3])
+    assert len(found) > 3
+    assert all(a.x1 < b.x0 for a, b in itertools.pairwise(found))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("inches", [(5.0, 4.0), (3.0, 3.0), (3.4, 1.2), (2.0, 2.0)])
+@pytest.mark.parametrize("peak", [3e-5, 0.7, 950.0, 12_345.0, 4.3e6])
+@pytest.mark.parametrize("behind", [0.0, 0.5])
+def test_circles_have_numbers(inches: tuple[float, float], peak: float, behind: float) -> None:
+    """The outermost has one with the unit, and none lies on another."""
+    gamma = np.arange(0.0, 181.0, 2.0)
+    values = peak * np.where(gamma <= 90, np.cos(np.radians(gamma)), behind * np.abs(np.cos(np.radians(gamma))))
+    figure = Figure(figsize=inches, dpi=100)
+    axes = figure.add_axes((0.05, 0.15, 0.9, 0.75))
+    et.plot_intensity(et.Intensity([0], gamma, [values.clip(0.0)]), ax=axes)
+    numbers = [text for text in axes.texts if "°" not in text.get_text() and text.get_va() == "bottom"]
+    assert sum(text.get_text().endswith(" cd") for text in numbers) == 1
+    found = boxes(numbers, figure)
+    assert all(a.x1 < b.x0 for a, b in itertools.pairwise(found))
