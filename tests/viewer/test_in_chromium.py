@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -133,6 +136,45 @@ def test_the_address_tells_what_is_upright_and_the_command_repeats_it(
     assert (exact > 0).sum() > 3
     assert np.abs(found - exact).max() <= bound * exact.max()
     assert np.abs(found[exact > 0] / exact[exact > 0] - 1).max() < bound
+
+
+@pytest.mark.slow
+def test_an_address_that_names_no_view_changes_nothing(browser: Browser, tmp_path: Path) -> None:
+    """What is out of its domain or no number is passed over; a map, which has an observer, is not turned."""
+    screen = et.Screen(4, 3, 8, 6)
+    lmap = et.LuminanceMap(np.ones((6, 8)), np.ones((6, 8)), np.ones((6, 8)), et.Observer(20, 30, 500), screen)
+    for value, name in ((FIELDS["lamp"], "lamp"), (lmap, "map")):
+        path = tmp_path / f"{name}.html"
+        write_page(exhibit_of(value, name=name), path)
+        browser.open(f"{path.as_uri()}#width=3")
+        first = browser.evaluate("({...etendue.state.view})")
+        wrong = "theta=200&phi=x&distance=-5&width=3&columns=2.5&rows=0&target=1,2&up=0,0,0&roll=Infinity"
+        browser.open(f"{path.as_uri()}?again#{wrong}")
+        assert browser.evaluate("({...etendue.state.view})") == first, name
+        browser.open(f"{path.as_uri()}?turned#theta=50&phi=10&distance=90&width=3&target=0,0.5,0")
+        found = browser.evaluate("({...etendue.state.view})")
+        turned = [50, 10, 90] if name == "lamp" else [20, 30, 500]
+        assert [found["theta"], found["phi"], found["distance"]] == turned
+        assert (found["width"], found["target"]) == (3, [0, 0.5, 0])
+
+
+@pytest.mark.slow
+def test_the_command_of_indexed_rays_makes_the_map_that_is_seen(browser: Browser, tmp_path: Path) -> None:
+    """By the light field that was fitted to them, and not by the cone, which maps of an index are made by otherwise."""
+    index = tmp_path / "rings.etd"
+    et.RayIndex.build(et.RingSource(rays=4000).ray_set(), index)
+    exhibit = exhibit_of(et.RayIndex.open(index), name="rings", file=str(index))
+    opened(browser, exhibit, tmp_path / "rings.html")
+    browser.wait("document.getElementById('command').textContent")
+    words = shlex.split(browser.evaluate("document.getElementById('command').textContent"))
+    assert words[0] == "etendue"
+    subprocess.run([sys.executable, "-m", *words], cwd=tmp_path, check=True, capture_output=True)
+    truth = et.read_map(tmp_path / "map.exr")
+    picks = np.random.default_rng(5).integers(0, truth.values.shape[::-1], (50, 2)).tolist()
+    found = np.array(browser.evaluate(f"{picks}.map(([c, r]) => etendue.reading(c, r).value)"))
+    exact = np.array([truth.values[r, c] for c, r in picks])
+    assert (exact > 0).sum() > 5
+    np.testing.assert_allclose(found, exact, rtol=exhibit.subject["field"]["bound"] + 1e-3, atol=0)
 
 
 @pytest.mark.slow

@@ -119,8 +119,8 @@ def test_the_progress_of_a_scene_goes_on_through_the_fit() -> None:
 def test_the_intensity_solid_holds_the_beam() -> None:
     """Of a spot of 7° in an oblique direction: what is drawn, linear between the nodes, is off by 8 % of the top at most.
 
-    Between even nodes of 10° and 2.5° it is by 21 %. Against the core's sums towards directions over the spot. The first look
-    from where it is brightest is within 1° of its middle.
+    Between even nodes of 10° and 2.5° it is by 21 %. Against the core's sums for directions all over the spot. The first
+    look is from where it is brightest, within 1° of its middle.
     """
     theta, phi = 23.7, 33.3
     field = spot(width=7.0, theta=theta, phi=phi)

@@ -187,7 +187,8 @@ def exhibit_of(
         field = fit_or_recall(light, cache=cache, threads=threads, progress=fitting)
         return Exhibit({**field_subject(field, name, file), **_scene_subject(viewable, seed)}, field, viewable)
     field = fit_or_recall(viewable, cache=cache, threads=threads, progress=progress)
-    return Exhibit(field_subject(field, name, file), field)
+    # Of rays that are indexed, maps are made by the cone if nothing is said.
+    return Exhibit(field_subject(field, name, file, "--method lightfield "), field)
 
 
 def _part_of(progress: Progress | None, before: float, each: float, whole: float) -> Progress | None:

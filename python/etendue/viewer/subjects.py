@@ -46,7 +46,7 @@ ASIDE = 10.0
 """Distance of the first observer at least, in widths of what is seen."""
 
 
-def field_subject(field: LightField, name: str, file: str) -> dict[str, Any]:
+def field_subject(field: LightField, name: str, file: str, options: str = "") -> dict[str, Any]:
     """A light field for the page.
 
     Parameters
@@ -57,6 +57,8 @@ def field_subject(field: LightField, name: str, file: str) -> dict[str, Any]:
         Title of the page.
     file : str
         As commands name it.
+    options : str
+        Of the command that makes a map of the file by this field, with a space behind them.
     """
     tables, packed = FieldTables.within(field, MOST_BYTES)
     solid = intensity_solid(field)
@@ -66,6 +68,7 @@ def field_subject(field: LightField, name: str, file: str) -> dict[str, Any]:
         "kind": "field",
         "name": name,
         "file": file,
+        "options": options,
         "facts": _facts(field),
         "quantity": "luminance" if field.flux_unit == "lm" else "radiance",
         "unit": LUMINANCE_UNIT[field.flux_unit],

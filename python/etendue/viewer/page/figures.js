@@ -72,8 +72,8 @@ export function command() {
   const upright = turns.filter(Boolean).join("");
   const file = /^[\w./-]+$/.test(packed.file) ? packed.file : `'${packed.file.replaceAll("'", `'\\''`)}'`;
   return (
-    `etendue luminance ${file} --observer=${digits(view.theta)},${digits(view.phi)} --distance ${digits(view.distance)} ` +
-    `--target=${view.target.map(digits).join(",")} ${upright}--size ${digits(view.width)},${digits(view.height)} ` +
+    `etendue luminance ${file} ${packed.options}--observer=${digits(view.theta)},${digits(view.phi)} ` +
+    `--distance ${digits(view.distance)} --target=${view.target.map(digits).join(",")} ${upright}--size ${digits(view.width)},${digits(view.height)} ` +
     `--pixels ${view.columns},${view.rows} -o map.exr`
   );
 }

@@ -1,11 +1,12 @@
 // The view: set, in motion, at rest, and drawn frame by frame.
 
 import { intensityHere, listRegions, showCommand, showReading, showView } from "./figures.js";
+import { typed } from "./numbers.js";
 import { drawMarks, drawSection } from "./overlay.js";
 import { $ } from "./panel.js";
 import { PixelMap } from "./picture.js";
 import { measureIntensity, measureRegion, measureSection } from "./readings.js";
-import { PIXEL, draw, packed, server, state } from "./state.js";
+import { PIXEL, draw, fixed, packed, server, state } from "./state.js";
 import { View } from "./view.js";
 
 const REST = 220; // ms after the last touch of a wheel or key at which the picture is at rest
@@ -25,12 +26,25 @@ export function firstView() {
   return new View({ ...rest, width: Math.max(width, (height * columns) / rows), ...shape, ...asked });
 }
 
-/** The view that the address asks for, as #theta=30&phi=0&roll=90&width=4. */
+/** Which finite numbers an address may ask for, where not all of them. */
+const ALLOWED = {
+  theta: (x) => x >= 0 && x <= 180,
+  distance: (x) => x > 0,
+  width: (x) => x > 0,
+  columns: (x) => x >= 8 && x % 1 === 0,
+  rows: (x) => x >= 8 && x % 1 === 0,
+};
+
+/** The view that the address asks for, as #theta=30&phi=0&roll=90&width=4, without what is no view; of a map, what can be moved. */
 function viewOfAddress() {
   const found = {};
-  for (const [name, value] of new URLSearchParams(location.hash.slice(1))) {
-    if (["theta", "phi", "distance", "roll", "width", "columns", "rows"].includes(name)) found[name] = Number(value);
-    if (["target", "up"].includes(name)) found[name] = value.split(",").map(Number);
+  const numbers = fixed() ? ["width"] : ["theta", "phi", "distance", "roll", "width", "columns", "rows"];
+  const vectors = fixed() ? ["target"] : ["target", "up"];
+  for (const [name, text] of new URLSearchParams(location.hash.slice(1))) {
+    const values = text.split(",").map(typed);
+    if (!values.every(Number.isFinite)) continue;
+    if (numbers.includes(name) && values.length === 1 && (ALLOWED[name]?.(values[0]) ?? true)) found[name] = values[0];
+    if (vectors.includes(name) && values.length === 3 && (name === "target" || values.some(Boolean))) found[name] = values;
   }
   return found;
 }
