@@ -95,13 +95,12 @@ def draw_marks(axes: Axes, marks: Sequence[Mark]) -> None:
 
     Numbers that would lie on each other, those of equal outlines among them, stand side by side.
     """
-    frame = (*sorted(axes.get_xlim()), *sorted(axes.get_ylim()))
-    left, right, bottom, top = frame
+    (left, right), (bottom, top) = sorted(axes.get_xlim()), sorted(axes.get_ylim())
     points = 72.0 / style.figure_of(axes).dpi
     places: list[tuple[Array, Array, list[int]]] = []
     for mark in marks:
         draw_outline(axes, mark.outline)
-        seen = clipped(mark.outline, frame)
+        seen = clipped(mark.outline, (left, right, bottom, top))
         corners = (seen if len(seen) else mark.outline).clip((left, bottom), (right, top))
         corner = corners[np.argmax(corners[:, 1] - corners[:, 0])]
         dot = points * np.asarray(axes.transData.transform(corner))
@@ -116,7 +115,7 @@ def draw_marks(axes: Axes, marks: Sequence[Mark]) -> None:
         # At the right and at the lower edge there is room on the other side only.
         ends, low = x + ROOM * len(numbers) > points * edges.x1, y - ROOM < points * edges.y0
         axes.annotate(
-            ", ".join(map(str, numbers)), corner, xytext=(-3 if ends else 3, 3 if low else -3), textcoords="offset points",
+            ", ".join(map(str, numbers)), (float(corner[0]), float(corner[1])), xytext=(-3 if ends else 3, 3 if low else -3), textcoords="offset points",
             ha="right" if ends else "left", va="bottom" if low else "top", size=style.TICK_SIZE, color="white",
             weight="bold", path_effects=halo(), annotation_clip=False,
         )  # fmt: skip
