@@ -115,10 +115,18 @@ def draw_marks(axes: Axes, marks: Sequence[Mark]) -> None:
         # At the right and at the lower edge there is room on the other side only.
         ends, low = x + ROOM * len(numbers) > points * edges.x1, y - ROOM < points * edges.y0
         axes.annotate(
-            ", ".join(map(str, numbers)), (float(corner[0]), float(corner[1])), xytext=(-3 if ends else 3, 3 if low else -3), textcoords="offset points",
-            ha="right" if ends else "left", va="bottom" if low else "top", size=style.TICK_SIZE, color="white",
-            weight="bold", path_effects=halo(), annotation_clip=False,
-        )  # fmt: skip
+            ", ".join(map(str, numbers)),
+            (float(corner[0]), float(corner[1])),
+            xytext=(-3 if ends else 3, 3 if low else -3),
+            textcoords="offset points",
+            ha="right" if ends else "left",
+            va="bottom" if low else "top",
+            size=style.TICK_SIZE,
+            color="white",
+            weight="bold",
+            path_effects=halo(),
+            annotation_clip=False,
+        )
 
 
 def halo() -> list[Any]:
