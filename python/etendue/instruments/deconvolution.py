@@ -14,7 +14,7 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.output import atomic_output
 from etendue.instruments.courses import after, course_of, rule_of
 from etendue.instruments.goniometer_scan import GoniometerScan, full_width, summit, total_scatter
-from etendue.instruments.operators import Operator, OperatorName, middle_of, operator_of, sparse_if_large
+from etendue.instruments.operators import Operator, OperatorName, folded, middle_of, operator_of, sparse_if_large
 from etendue.instruments.penalised_lobe import PenalisedLobe, penalised_lobe
 from etendue.quantities.ray_stream import checked_seed
 
@@ -26,6 +26,12 @@ REPLICATES = 32
 
 FURTHER = 4
 """Times the iterations after which a lobe stands for the truth when errors are estimated."""
+
+FWHM = float(np.sqrt(8.0 * np.log(2.0)))
+"""Full widths at half maximum of a Gaussian in its widths."""
+
+ROUND = 0.01
+"""By how much a peak may be off without a word, if the lobe is round in direction cosines and not in the angle."""
 
 UNLIKELY = 5.0
 """Standard deviations of the deviance from which on what is left of the scan is not its noise."""
@@ -215,6 +221,8 @@ def deconvolve(
         spread = np.hypot(spread, _error_of_middle(model, found.lobe, full, gain))
     image = model.matrix @ found.lobe
     values, error, raw, fitted, totals = _as_bsdf(scan, full, model, found.lobe, spread, image)
+    if operator == "rings":
+        notes += _of_one_plane(scan, signature, values)
     residuals = np.asarray(scan.flux - fitted)
     if gain is not None and scan.standard_error is not None:
         lit = scan.standard_error > 0.0
@@ -258,6 +266,28 @@ def _doubts(scan: GoniometerScan, signature: GoniometerScan) -> list[str]:
     for low, high in signature.gaps:
         found.append(f"the instrument function has no positions between {low:g}° and {high:g}°: taken for linear")
     return found
+
+
+def _of_one_plane(scan: GoniometerScan, signature: GoniometerScan, values: Array) -> list[str]:
+    """By how much a peak is off if the lobe is as wide in direction cosines on all sides, and not in the angle.
+
+    Seen from the sample such a lobe is 1/cosθ times as wide in the plane of incidence as across it. Of a Gaussian lobe of
+    widths σ and σ′ behind a Gaussian blur of width b the scan holds σσ′/√((σ² + b²)(σ′² + b²)) of the peak, of which rings
+    undo σ²/(σ² + b²).
+    """
+    width = full_width(scan.angle, values) / FWHM
+    if not scan.sample or not scan.incidence > 0.0 or not width > 0.0:
+        return []
+    radius, seen = folded(signature)
+    blur = float(np.sqrt(0.5 * np.sum(radius**3 * seen) / np.sum(radius * seen)))
+    cosine = float(np.cos(np.radians(scan.incidence)))
+    across = width * (cosine if scan.plane == "in-plane" else 1.0 / cosine)
+    part = np.hypot(width, blur) / width * across / np.hypot(across, blur)
+    if abs(part - 1.0) < ROUND:
+        return []
+    said = f"at {scan.incidence:g}° of incidence the rings take the lobe for round in the angle"
+    surfaces = "round in direction cosines, as polished and rough surfaces have it"
+    return [f"{said}; of one that is {surfaces}, the peak found is about {part:.2f} of the true one"]
 
 
 def _without_gaps(scan: GoniometerScan) -> GoniometerScan:

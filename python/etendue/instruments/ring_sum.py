@@ -33,6 +33,7 @@ def sum_of_rings(angle: Array, flux: Callable[[Array], Array], incidence: float,
     incidence : float
         [°]
     plane : {"in-plane", "cross-plane"}
+        Which the detector moved in.
 
     Examples
     --------
@@ -55,10 +56,9 @@ def sum_of_rings(angle: Array, flux: Callable[[Array], Array], incidence: float,
     half = np.pi - np.arccos(np.clip(cosine, -1.0, 1.0))
     reach = [float(r[side].max(initial=0.0)) for side in (onwards, ~onwards)]
     both = r <= min(reach)
+    part = half
     if plane == "in-plane":
         part = np.where(onwards, half * half / np.pi, 2.0 * half - half * half / np.pi)
-    else:
-        part = half
     part = np.where(both, part, 2.0 * half)
     values = flux(x) * part
     # Between positions r is smooth but for the regular direction itself, where it is 0.

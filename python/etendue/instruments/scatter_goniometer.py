@@ -40,6 +40,12 @@ SPAN = 9.0
 SHARED = "all positions count the same rays: neighbours err together"
 """Note of scans whose errors are not independent."""
 
+SQUARE = (
+    "the aperture is square: what it shows of a point is not round, as the rings of deconvolve take it to be, whose peak "
+    "may be off by more than half; deconvolve_directions knows the aperture"
+)
+"""Note of scans by a square aperture."""
+
 
 @dataclasses.dataclass(frozen=True)
 class ScatterGoniometer:
@@ -493,6 +499,8 @@ class ScatterGoniometer:
         notes: tuple[str, ...] = (),
     ) -> GoniometerScan:
         flux, error = self._with_noise(flux, error, seed)
+        if self.aperture == "square":
+            notes = (*notes, SQUARE)
         return GoniometerScan(
             angle,
             flux,
