@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Callable
 
 import etendue as et
@@ -120,6 +122,26 @@ def test_a_leaning_lobe_node_by_node(exponent: float, c: float, gamma: float) ->
     assert_agree(values=values, expected=expected[apart][held], standard_error=errors)
     turned = np.roll(expected, 1, axis=0)[apart][held]
     assert_differ(values=values, other=turned, standard_error=errors)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("n", "step", "told"), [(20_000, 2.5, False), (20_000, 5.0, False), (400_000, 7.5, True)])
+def test_what_steps_blur_beyond_the_errors_is_told(n: int, step: float, told: bool) -> None:
+    """Intensity at the nodes less the means around them, by quadrature, over the errors of the means: the note's number is
+    their root mean square within a quarter, and there is none if it is below 1."""
+    planes, axis = round(180.0 / step), direction(31.0, 32.0)
+    led = intensity_distribution(rays_of(leaning_lobe(n, 10.0, axis, 5), np.full(n, 3.0 / n)), planes, step)
+    at = 3.0 * lobe(10.0, axis)(led.c[:, None], led.gamma)
+    blur = at - 3.0 * hat_means(lobe(10.0, axis), c=led.c, gamma=led.gamma)[0]
+    lit = (at > 0.02 * at.max()) & (led.standard_error > 0.0)
+    off = math.sqrt(np.mean((blur[lit] / led.standard_error[lit]) ** 2))
+    notes = [note for note in led.notes if note.startswith("errors are those of the means around nodes")]
+    assert told is (off > 1.0)
+    assert len(notes) == told
+    if told:
+        assert float(re.search(r"by ([\d.]+) of them", notes[0])[1]) == pytest.approx(off, rel=0.25)  # type: ignore[index]
+        share = float(re.search(r"about ([\d.]+)% of the peak", notes[0])[1])  # type: ignore[index]
+        assert share == pytest.approx(100.0 * np.abs(blur).max() / at.max(), rel=0.25)
 
 
 @pytest.mark.slow

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from etendue.lightfield.light_field import LightField
+from etendue.quantities.arguments import require
 from etendue.quantities.distinct_rays import DistinctRays
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.node_choice import Choice, choose_nodes
@@ -18,7 +20,11 @@ that they are filled with."""
 
 
 def intensity_distribution(
-    rays: RayStream, c_planes: int | None = None, gamma_step: float | None = None, *, progress: Progress | None = None
+    rays: RayStream | LightField,
+    c_planes: int | None = None,
+    gamma_step: float | None = None,
+    *,
+    progress: Progress | None = None,
 ) -> Intensity:
     """Far-field intensity of rays, from their directions alone.
 
@@ -29,8 +35,9 @@ def intensity_distribution(
 
     Parameters
     ----------
-    rays : RayStream
-        A ray set, or a source that draws its rays on demand; they are read in batches.
+    rays : RayStream or LightField
+        A ray set, or a source that draws its rays on demand; they are read in batches. The intensity of a light field is
+        that of `LightField.intensity`.
     c_planes : int, optional
         Half planes C, from 0° in equal steps. C is the azimuth from +X towards +Y; 1 means the mean over all of them.
         None: chosen from the rays, for each γ.
@@ -53,7 +60,7 @@ def intensity_distribution(
     Raises
     ------
     ArgumentError
-        If there are no such planes or steps.
+        If there are no such planes or steps, or `rays` are none.
 
     Examples
     --------
@@ -63,6 +70,9 @@ def intensity_distribution(
     >>> bool(abs(led.at(30, 60) * np.pi / rays.total_flux - 0.5) < 0.01), led.unit, round(led.flux / rays.total_flux, 9)
     (True, 'cd', 1.0)
     """
+    if isinstance(rays, LightField):
+        return rays.intensity(c_planes, gamma_step)
+    require(rays, RayStream, "intensity_distribution: rays", "rays, of a file et.read_rays(path), or a LightField")
     distinct = DistinctRays.of(rays)
     (nodes, told), power = _nodes(distinct.rays, c_planes, gamma_step)
     core = nodes.core()
@@ -83,7 +93,7 @@ def intensity_distribution(
         values=result.values * power,
         standard_error=result.standard_error * power,
         flux_error=result.flux_error * power,
-        notes=(*notes, *_notes(result), *rays.notes),
+        notes=(*notes, *result.notes, *_notes(result), *rays.notes),
     )
 
 

@@ -23,6 +23,12 @@ Array = npt.NDArray[np.float64]
 MOST_CELLS = 1 << 26
 """Cells of a table: half a gigabyte for each of its sums."""
 
+LIT = 0.02
+"""Share of the peak above which nodes are asked whether steps are too wide for them."""
+
+MANY = 10.0
+"""Standard errors beyond which it is of no consequence how many."""
+
 NEIGHBOURS = 0.25
 """Correlation of the errors of neighbouring nodes: ∫φφ' over ∫φ² of two hats in even light."""
 
@@ -150,11 +156,13 @@ class Nodes:
         )
         return between[0].T, between[1].T
 
-    def _blur(self, values: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-        """What the means around nodes are off where light rises from a dark pole, and whether it is dark beside a node.
+    def _blur(self, values: Array, chosen: bool) -> tuple[Array, npt.NDArray[np.bool_]]:
+        """What the means around nodes are off from the intensity at them, and whether it is dark beside a node.
 
+        Chosen steps hold the light but where it rises from a dark pole: they are chosen by the light of all rows together,
+        and hold those less well. Asked ones are off everywhere, around the axis as well, by h²/12 of the curvature there.
         About a pole light is even in γ, as I₀ + bγ²: with steps h, the pole's node is off by 0.3 bh², and the row beside it
-        is 1.2 bh² above it. Steps are chosen by the light of such rows together, and hold each of them less well.
+        is 1.2 bh² above it.
         """
         rows = np.split(values, np.cumsum([len(row) for row in self.c])[:-1])
         gamma = np.radians(self.gamma)
@@ -172,7 +180,9 @@ class Nodes:
                 below, above = (_on(c, self.c[j], rows[j]) for j in (i - 1, i + 1))
                 along = _hat_bias(below, row, above, gamma[i - 1 : i + 2])
                 dark.append((below == 0.0) | (above == 0.0) | (np.roll(row, 1) == 0.0) | (np.roll(row, -1) == 0.0))
-            off.append(np.where(rising[i], along, 0.0))
+            # Along a row, of even steps, the second difference is the curvature times h².
+            around = 0.0 if chosen else (np.roll(row, 1) - 2.0 * row + np.roll(row, -1)) / 12.0
+            off.append(np.where(rising[i] | (not chosen), along + around, 0.0))
         return np.concatenate(off), np.concatenate(dark)
 
     def intensity(
@@ -186,13 +196,16 @@ class Nodes:
         """The table of sums over rays; `flux` and `error` are those of all cells, the one of all rays being the last.
 
         Where light ends, or rises from a dark pole, the errors of nodes that were chosen hold what the mean around a node is
-        off from the intensity at it. Of steps that were asked for, errors are those of the means.
+        off from the intensity at it. Of steps that were asked for, errors are those of the means; a note tells if the steps
+        are so wide for the light that the intensity at the nodes is off from them by more.
         """
-        noise = error[:-1]
+        noise, level = error[:-1], flux[:-1] / self.solid_angle
         # Chosen steps are wider beside the poles (`etendue.quantities.node_choice`).
-        if not np.allclose(np.diff(self.gamma), self.gamma[1] - self.gamma[0]):
-            level = flux[:-1] / self.solid_angle
-            blur, dark = self._blur(level)
+        chosen = not np.allclose(np.diff(self.gamma), self.gamma[1] - self.gamma[0])
+        blur, dark = self._blur(level, chosen)
+        if not chosen:
+            notes = (*notes, *_told_of_blur(level, noise / self.solid_angle, blur))
+        else:
             noise = np.hypot(noise, blur * self.solid_angle)
             # Where it is dark beside a node, it may be dark there as well.
             noise = np.where(dark & (level > 0.0), np.maximum(noise, flux[:-1]), noise)
@@ -207,6 +220,24 @@ class Nodes:
             provenance=provenance,
             notes=notes,
         )
+
+
+def _told_of_blur(level: Array, error: Array, blur: Array) -> tuple[str, ...]:
+    """What is to be said of nodes around which the light bends by more than their errors, if it does."""
+    top = float(level.max(initial=0.0))
+    lit = (level > LIT * top) & (error > 0.0)
+    if not lit.any():
+        return ()
+    off = float(np.sqrt(np.mean((blur[lit] / error[lit]) ** 2)))
+    if not off > 1.0:
+        return ()
+    by = f"{off:.2g}" if off < MANY else f"more than {MANY:g}"
+    told = (
+        f"errors are those of the means around nodes: with steps this wide, the intensity at a node is off from the mean by "
+        f"{by} of them (root mean square), up to about {np.abs(blur[lit]).max() / top:.1%} of the peak, and beam angles and "
+        "fluxes of zones accordingly; without stated steps, nodes are chosen that suit the light"
+    )
+    return (told,)
 
 
 def check_steps(c_planes: int | None, gamma_step: float | None) -> None:
