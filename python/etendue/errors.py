@@ -22,9 +22,10 @@ class ArgumentError(EtendueError, ValueError):
 class UnknownNameError(EtendueError, ValueError):
     """A name (option, key, format, filter) that does not exist; the message suggests the nearest one."""
 
-    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+    def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
         choices = tuple(sorted(known))
-        near = nearest_name(name, choices)
+        # What is no text resembles no name.
+        near = nearest_name(name, choices) if isinstance(name, str) else None
         hint = f" Did you mean {near!r}?" if near else ""
         self.kind, self.name, self.known = kind, name, choices
         super().__init__(f"unknown {kind} {name!r}.{hint} Known: {', '.join(choices)}.")

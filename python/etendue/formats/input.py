@@ -15,6 +15,7 @@ from pathlib import Path, PosixPath
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.output import naming
 from etendue.formats.temporary import temporary_beside
+from etendue.quantities.arguments import described
 from etendue.quantities.report import ChangedFileWarning
 
 STREAM_LIMIT = 64 << 30
@@ -74,6 +75,8 @@ def require_file(path: Path, why: str) -> None:
 
 def as_path(path: str | os.PathLike[str]) -> Path:
     """A path as such, and the path of a pipe as that: `Path` would forget where its bytes are."""
+    if not isinstance(path, str | os.PathLike):
+        raise ArgumentError(f"path is {described(path)}; give the path of a file.")
     return path if isinstance(path, Path) else Path(path)
 
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.lightfield.pilot_sample import pilot_sample
+from etendue.quantities.arguments import require_number
 from etendue.quantities.ray_stream import RayStream
 
 FloatArray = npt.NDArray[np.float64]
@@ -146,8 +147,11 @@ class Surface(abc.ABC):
             value = getattr(self, field.name)
             if isinstance(value, bool) or value is None or field.name == "axis":
                 continue
+            several = isinstance(value, Iterable) and not isinstance(value, str)
+            for one in value if several else (value,):
+                require_number(one, f"{type(self).__name__}: {field.name}", "numbers" if several else "a number")
             # Whatever numbers came in, floats are compared, printed and saved.
-            numbers = tuple(float(v) for v in value) if isinstance(value, Iterable) else float(value)
+            numbers = tuple(float(v) for v in value) if several else float(value)
             object.__setattr__(self, field.name, numbers)
             if not np.isfinite(numbers).all():
                 raise ArgumentError(f"{type(self).__name__}: {field.name} is {value!r}; give finite lengths in mm.")

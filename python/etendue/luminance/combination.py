@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import require
 from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map, dead_note
 
 
@@ -37,6 +38,7 @@ def combine_maps(maps: Sequence[LuminanceMap]) -> LuminanceMap:
     >>> int(both.rays.sum()) == sum(int(run.rays.sum()) for run in runs)
     True
     """
+    require(maps, (list, tuple), "combine_maps: maps", "a list of maps of the same view, e.g. [first, second]")
     if not maps:
         raise ArgumentError("combine_maps: no maps.")
     for lmap in maps:

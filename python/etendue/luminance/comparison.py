@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.luminance.regions import AnyRegion, Mask
+from etendue.luminance.regions import AnyRegion, Mask, check_region
+from etendue.quantities.arguments import require_number
 from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map
 from etendue.quantities.powers_of_ten import rounded
 from etendue.quantities.printable import printable
@@ -249,6 +250,8 @@ def compare(
     for lmap in (test, reference):
         check_luminance_map(lmap, "compare")
     _check_comparable(test, reference, ignore_geometry)
+    if region is not None:
+        check_region(region, "compare")
     used = region.mask(reference.screen) if region else np.ones(reference.screen.shape, dtype=np.bool_)
     alive = ~(np.isnan(test.values) | np.isnan(reference.values))
     dead_in_region = [int((np.isnan(lmap.values) & used).sum()) for lmap in (test, reference)]
@@ -453,6 +456,10 @@ def cross_section(lmap: LuminanceMap, *, x: float | None = None, y: float | None
     """
     if (x is None) == (y is None):
         raise ArgumentError("cross_section: give exactly one of x (cut along a column) and y (cut along a row), in mm.")
+    check_luminance_map(lmap, "cross_section")
+    for name, place in (("x", x), ("y", y)):
+        if place is not None:
+            require_number(place, f"cross_section: {name}", "a place on the screen in mm")
     screen = lmap.screen
     axis: Literal["x", "y"]
     if y is not None:

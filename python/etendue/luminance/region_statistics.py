@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.luminance.comparison import DEAD_RULES, DeadRule
-from etendue.luminance.regions import ON_THE_EDGE, AnyRegion
+from etendue.luminance.regions import ON_THE_EDGE, AnyRegion, check_region
+from etendue.quantities.arguments import LUMINANCE_OR_ILLUMINANCE, require, require_number
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Screen
@@ -89,7 +90,7 @@ class RegionStatistics:
 def region_statistics(
     lmap: LuminanceMap | IlluminanceMap,
     region: AnyRegion,
-    percentiles: Sequence[float] = PERCENTILES,
+    percentiles: Sequence[float] | float = PERCENTILES,
     dead: DeadRule = "zero",
 ) -> RegionStatistics:
     """Mean, extremes, percentiles and uniformity of a part of a map.
@@ -100,7 +101,7 @@ def region_statistics(
         With its standard errors.
     region : Region or PolygonRegion
         On the screen of the map.
-    percentiles : sequence of float
+    percentiles : sequence of float, or float
         Which ones [%], 0 to 100.
     dead : {"zero", "exclude"}
         ``"zero"``: a dead pixel counts as 0 ± 0, so that the mean is not biased: where rays are few, those pixels that one
@@ -109,7 +110,8 @@ def region_statistics(
     Raises
     ------
     ArgumentError
-        If no pixel centre, or no live pixel, lies in the region, or a percentile is out of its range.
+        If no pixel centre, or no live pixel, lies in the region, a percentile is out of its range, or something is no map,
+        no region or no number.
     UnknownNameError
         If there is no such rule for dead pixels.
 
@@ -122,6 +124,9 @@ def region_statistics(
     >>> found.mean, round(found.mean_error, 3), round(found.mean_error_apart, 3), round(found.uniformity, 3)
     (3.0, 0.3, 0.173, 0.667)
     """
+    require(lmap, (LuminanceMap, IlluminanceMap), "region_statistics: lmap", LUMINANCE_OR_ILLUMINANCE)
+    check_region(region, "region_statistics")
+    percentiles = _percentiles(percentiles)
     if not all(0.0 <= share <= 100.0 for share in percentiles):
         raise ArgumentError(f"region_statistics: percentiles are {tuple(percentiles)}; give numbers from 0 to 100.")
     if dead not in DEAD_RULES:
@@ -151,6 +156,14 @@ def region_statistics(
         unit=lmap.unit,
         notes=_beyond(region, lmap.screen),
     )
+
+
+def _percentiles(given: Any) -> tuple[float, ...]:
+    """As several, where one is given."""
+    shares = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
+    for share in shares:
+        require_number(share, "region_statistics: a percentile", "a number from 0 to 100")
+    return shares
 
 
 def _beyond(region: AnyRegion, screen: Screen) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import require, require_number
 from etendue.quantities.observer import Screen
 
 Mask = npt.NDArray[np.bool_]
@@ -48,6 +49,8 @@ class Region:
     top: float
 
     def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            require_number(getattr(self, field.name), f"Region: {field.name}", "a limit in mm")
         if not all(map(math.isfinite, dataclasses.astuple(self))):
             raise ArgumentError(f"{self._told}: give four finite limits in mm.")
         if not (self.left < self.right and self.bottom < self.top):
@@ -108,7 +111,11 @@ class PolygonRegion:
     corners: Sequence[Corner]
 
     def __post_init__(self) -> None:
-        corners = tuple((float(x), float(y)) for x, y in self.corners)
+        try:
+            corners = tuple((float(x), float(y)) for x, y in self.corners)
+        except (TypeError, ValueError):
+            told = "PolygonRegion: corners are no pairs of numbers"
+            raise ArgumentError(f"{told}; give (x, y) in mm for each, e.g. [(0, 0), (4, 0), (0, 3)].") from None
         if len(corners) < 3 or not all(math.isfinite(x) and math.isfinite(y) for x, y in corners):
             raise ArgumentError(
                 f"region {_told(self.corners)}: give three or more corners with finite coordinates in mm."
@@ -163,6 +170,24 @@ AnyRegion = Region | PolygonRegion
 
 def _told(corners: Sequence[Corner]) -> str:
     return ",".join("/".join(f"{coordinate:g}" for coordinate in corner) for corner in corners)
+
+
+def check_region(given: object, asker: str) -> None:
+    """Refuse what is no region, such as its bare limits.
+
+    Raises
+    ------
+    ArgumentError
+        If so.
+
+    Examples
+    --------
+    >>> check_region((-1, 1, -2, 2), "compare")
+    Traceback (most recent call last):
+    etendue.errors.ArgumentError: compare: region is a tuple; give et.Region(left, right, bottom, top) or an et.PolygonRegion.
+    """
+    instead = "et.Region(left, right, bottom, top) or an et.PolygonRegion"
+    require(given, (Region, PolygonRegion), f"{asker}: region", instead)
 
 
 def parse_region(text: str) -> AnyRegion:

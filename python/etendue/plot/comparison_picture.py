@@ -17,6 +17,7 @@ from etendue.plot import style
 from etendue.plot.colour_scale import Scale, choose_scale, colour_map, normalisation, signed_normalisation
 from etendue.plot.map_picture import NARROWEST, axis_names, bar_beside, draw_colour_bar, draw_screen, picture_within
 from etendue.plot.region_marks import draw_outline
+from etendue.quantities.arguments import require
 from etendue.quantities.observer import Screen
 
 if TYPE_CHECKING:
@@ -125,6 +126,7 @@ def plot_comparison(
     >>> [axes.get_title(loc="left") for axes in plot_comparison(compare(lmap, lmap)).axes[:3]]
     ['test', 'reference', 'test − reference']
     """
+    require(comparison, Comparison, "plot_comparison: comparison", "what et.compare(test, reference) gives")
     if difference not in DIFFERENCES:
         raise UnknownNameError("difference", difference, DIFFERENCES)
     reference = comparison.reference

@@ -14,6 +14,7 @@ from etendue.errors import ArgumentError
 from etendue.luminance.comparison import CrossSection
 from etendue.plot import style
 from etendue.plot.colour_scale import Scale, choose_scale
+from etendue.quantities.arguments import require
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -190,6 +191,11 @@ def _edges(section: CrossSection) -> Array:
 
 
 def _check(sections: Sequence[CrossSection], labels: Sequence[str] | None) -> None:
+    require(
+        sections, (list, tuple), "plot_cross_sections: sections", "a list of them, e.g. [et.cross_section(lmap, y=0)]"
+    )
+    for one in sections:
+        require(one, CrossSection, "plot_cross_sections: a section", "what et.cross_section(lmap, y=0) gives")
     if not sections:
         raise ArgumentError("plot_cross_sections: no section was given; make some with cross_section(map, y=0).")
     kinds = sorted({f"{section.quantity} [{section.unit}] along {section.axis}" for section in sections})

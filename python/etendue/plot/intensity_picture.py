@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.plot import style
+from etendue.quantities.arguments import INTENSITY, require
 from etendue.quantities.data_sheet import DataSheet, data_sheet
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.measured import measured, measured_peak
@@ -125,6 +126,7 @@ def plot_intensity(
     """
     if kind not in INTENSITY_KINDS:
         raise UnknownNameError("kind of diagram", kind, INTENSITY_KINDS)
+    require(intensity, Intensity, "plot_intensity: intensity", INTENSITY)
     sheet = data_sheet(intensity)
     unit, factor = intensity.unit, 1.0
     if per_klm:

@@ -11,10 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import UnknownNameError
-from etendue.luminance.regions import AnyRegion
+from etendue.luminance.regions import AnyRegion, check_region
 from etendue.plot import style
 from etendue.plot.colour_scale import Scale, choose_scale, colour_map, normalisation
 from etendue.plot.region_marks import draw_marks, marks_of
+from etendue.quantities.arguments import LUMINANCE_OR_ILLUMINANCE, require, require_number
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Screen
@@ -138,6 +139,15 @@ def plot_map(
     """
     if show not in SHOWS:
         raise UnknownNameError("thing to show", show, SHOWS)
+    require(lmap, (LuminanceMap, IlluminanceMap), "plot_map: lmap", LUMINANCE_OR_ILLUMINANCE)
+    for name, end in (("vmin", vmin), ("vmax", vmax)):
+        if end is not None:
+            require_number(end, f"plot_map: {name}", f"a number in {lmap.unit}")
+    require(
+        regions, (list, tuple), "plot_map: regions", "a list of regions, e.g. [et.Region(left, right, bottom, top)]"
+    )
+    for region in regions:
+        check_region(region, "plot_map")
     shown = _shown(lmap, show, scale, vmin, vmax)
     marked = marks_of(lmap, regions)
     heading = title if title is not None else style.headed(shown.heading, lmap.provenance.source, 4.0)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.plot.scene_parts import Glow, Part, View, finish_kind, within
+from etendue.quantities.arguments import SCENE, require
 from etendue.scene import MEDIA, Compiled, Medium, Scene, compile_scene
 from etendue.scene.extents import box_of
 from etendue.tracing.section import Section
@@ -137,6 +138,7 @@ def lay_out_scene(
     >>> layout.bounds[1].tolist(), layout.views[0].faces[0].name
     ([2.0, 2.0, 2.0], 'ball.surface')
     """
+    require(scene, Scene, "draw_scene: scene", SCENE)
     planes = [Section.parse(text) for text in ([section] if isinstance(section, str) else section)]
     if not 1 <= len(planes) <= MOST_SECTIONS:
         raise ArgumentError(f"draw_scene: {len(planes)} sections; give 1 to {MOST_SECTIONS}.")

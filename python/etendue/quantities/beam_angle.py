@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.angle_table import gaps_of, kinks_along, kinks_around
+from etendue.quantities.arguments import INTENSITY, require, require_number
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.intensity_nodes import NEIGHBOURS
 from etendue.quantities.node_errors import known_errors, shared_around
@@ -127,6 +128,9 @@ def beam_angle(
     >>> round(beam_angle(lambertian).angle, 2), round(beam_angle(lambertian, share=0.1).angle, 1)
     (120.0, 168.5)
     """
+    require(intensity, Intensity, "beam_angle: intensity", INTENSITY)
+    require_number(share, "beam_angle: share", "a share of the intensity above 0 and below 1")
+    require_number(c, "beam_angle: c", "the angle C of the plane in degrees")
     if not 0.0 < share < 1.0:
         raise ArgumentError(f"beam_angle: share is {share:g}; give a share of the intensity above 0 and below 1.")
     if reference not in REFERENCES:
@@ -179,6 +183,8 @@ def cut_off_angle(intensity: Intensity, share: float = CUT_OFF) -> float:
     >>> round(cut_off_angle(shielded), 2)
     60.99
     """
+    require(intensity, Intensity, "cut_off_angle: intensity", INTENSITY)
+    require_number(share, "cut_off_angle: share", "a share of the intensity above 0 and below 1")
     if not 0.0 < share < 1.0:
         raise ArgumentError(f"cut_off_angle: share is {share:g}; give a share of the intensity above 0 and below 1.")
     limit = share * intensity.peak_intensity

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from etendue.quantities.arguments import INTENSITY, require
 from etendue.quantities.beam_angle import FIELD, BeamAngle, beam_angle, cut_off_angle
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.measured import measured
@@ -122,6 +123,7 @@ def data_sheet(intensity: Intensity) -> DataSheet:
     >>> print("; ".join(figures.lines()[:4]))
     beam angle (50 %) 120°; field angle (10 %) 168.5°; below 1 % of the peak from γ = 89.43° on; CIE flux code 44 75 94 100 ?
     """
+    require(intensity, Intensity, "data_sheet: intensity", INTENSITY)
     planes = (0.0,) if intensity.symmetry() == "rotational" else (0.0, 90.0)
     steps = np.arange(0.0, 180.1, 10.0)
     flux, error = zonal_flux(intensity, steps)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.arguments import require_number
 
 Plane = Literal["view", "xy"]
 PLANES: tuple[Plane, ...] = get_args(Plane)
@@ -70,6 +71,9 @@ class Observer:
     roll: float = 0.0
 
     def __post_init__(self) -> None:
+        for name in ("theta", "phi", "distance", "roll"):
+            unit = "a length in mm" if name == "distance" else "an angle in °"
+            require_number(getattr(self, name), f"Observer: {name}", unit)
         if not 0.0 <= self.theta <= 180.0:
             raise ArgumentError(f"Observer: theta is {self.theta:g}°; give 0° to 180°, measured from +Z.")
         if not math.isfinite(self.phi):
@@ -198,6 +202,8 @@ class Screen:
     plane: Plane = "view"
 
     def __post_init__(self) -> None:
+        for name in ("width", "height", "columns", "rows"):
+            require_number(getattr(self, name), f"Screen: {name}", "a number")
         for name in ("width", "height"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.quantities.angle_table import gaps_of, hat_integrals, kinks_along, kinks_around
+from etendue.quantities.arguments import INTENSITY, described, require
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.intensity_nodes import NEIGHBOURS
 from etendue.quantities.node_errors import known_errors, shared_around
@@ -49,7 +50,11 @@ def zonal_flux(intensity: Intensity, edges: npt.ArrayLike) -> tuple[Array, Array
     >>> (zonal_flux(lambertian, [0, 30, 60, 90])[0] / np.pi).round(4).tolist()
     [0.25, 0.5, 0.25]
     """
-    wanted = np.asarray(edges, dtype=np.float64)
+    require(intensity, Intensity, "zonal_flux: intensity", INTENSITY)
+    try:
+        wanted = np.asarray(edges, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"zonal_flux: edges is {described(edges)}; give two or more angles γ that rise.") from None
     if wanted.ndim != 1 or wanted.size < 2 or not (np.isfinite(wanted).all() and (np.diff(wanted) > 0.0).all()):
         raise ArgumentError("zonal_flux: give at least two angles γ that rise.")
     if wanted[0] < 0.0 or wanted[-1] > 180.0:
