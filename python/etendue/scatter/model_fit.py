@@ -14,6 +14,7 @@ from etendue.errors import ArgumentError, SceneError, UnknownNameError
 from etendue.extras import scipy_part
 from etendue.quantities.bsdf_data import BsdfData
 from etendue.quantities.measured import measured
+from etendue.scatter.error_law import ErrorLaw, error_law
 from etendue.scatter.lobe_models import LARGEST_LOG, LOBE_MODELS, LobeModel
 from etendue.scatter.models import MODELS, Finish, Lambertian, Mixture
 from etendue.scatter.scans.scans import Scans
@@ -201,8 +202,11 @@ def fit_bsdf(scans: Scans, model: str) -> BsdfFit:
     """Fit a model to all incidences of scans of reflected light at once.
 
     Lobes are round in direction cosines and the same at all incidences, f being a function of |β − β₀|. The squares of
-    (value − f)/standard error are made least. Without standard errors residuals are relative to f, and the errors of the
-    parameters come from the scatter of the values about the model. Either way values count as independent of each other.
+    (value − f)/standard error are made least. Errors that rise with the values by a law, as those of counts do, are taken at
+    f and not at the value, as weights made of counts prefer those that are low by chance.
+
+    Without standard errors residuals are relative to f, and the errors of the parameters come from the scatter of the values
+    about the model. Either way values count as independent of each other.
 
     Parameters
     ----------
@@ -267,9 +271,25 @@ def fit_bsdf(scans: Scans, model: str) -> BsdfFit:
     return _summary(model, form, x, covariance, distance, scans, notes)
 
 
-def _residuals(form: _Form, x: Array, distance: Array, scans: Scans, scale: Array) -> Array:
-    off = form.f(x, distance) - scans.values
-    return np.asarray(off / (scale if scans.standard_error is None else scans.standard_error))
+def _law(scans: Scans) -> ErrorLaw | None:
+    if scans.standard_error is None:
+        return None
+    scan = np.zeros(scans.values.size, np.intp)
+    for k, (_, own) in enumerate(scans.by_incidence()):
+        scan[own] = k
+    return error_law(scans.values, scans.standard_error, np.abs(scans.scattered[:, 2]), scan)
+
+
+def _units(form: _Form, x: Array, distance: Array, scans: Scans, law: ErrorLaw | None) -> Array:
+    """What residuals are counted in: standard errors, those of a law at the model; without any, f."""
+    if law is not None:
+        least = 1e-3 * float(scans.values[scans.values > 0.0].min())
+        return law.at(np.maximum(form.f(x, distance), least))
+    return _scale(form, x, distance, scans.values) if scans.standard_error is None else scans.standard_error
+
+
+def _residuals(form: _Form, x: Array, distance: Array, scans: Scans, units: Array) -> Array:
+    return np.asarray((form.f(x, distance) - scans.values) / units)
 
 
 def _scale(form: _Form, x: Array, distance: Array, values: Array) -> Array:
@@ -296,10 +316,11 @@ def _least_squares(form: _Form, distance: Array, scans: Scans) -> tuple[Array, A
         raise ArgumentError(f"{values.size} values do not determine {starts[0].size} parameters: scan more directions")
     # Logarithms of f first: from a bad start the values about the specular direction alone would decide.
     near = [optimize.least_squares(rough, x, loss="soft_l1", x_scale="jac").x for x in starts]
-    best = min((fitted(x, _scale(form, x, distance, values)) for x in near), key=lambda one: one.cost)
-    for _ in range(ROUNDS if scans.standard_error is None else 0):
+    law = _law(scans)
+    best = min((fitted(x, _units(form, x, distance, scans, None)) for x in near), key=lambda one: one.cost)
+    for _ in range(ROUNDS if scans.standard_error is None or law is not None else 0):
         last = form.f(best.x, distance)
-        best = fitted(best.x, _scale(form, best.x, distance, values))
+        best = fitted(best.x, _units(form, best.x, distance, scans, law))
         if np.abs(form.f(best.x, distance) - last).max() <= SETTLED * np.abs(last).max():
             break
     return best.x, _covariance(form, best, scans)
@@ -356,9 +377,10 @@ def _summary(
     freedom = scans.values.size - x.size
     scale = _scale(form, x, distance, scans.values)
     relative = (form.f(x, distance) - scans.values) / scale
+    units = _units(form, x, distance, scans, _law(scans))
     chi2 = math.nan
     if scans.standard_error is not None:
-        chi2 = float(np.sum(_residuals(form, x, distance, scans, scale) ** 2)) / freedom
+        chi2 = float(np.sum(_residuals(form, x, distance, scans, units) ** 2)) / freedom
         if chi2 > MISFIT:
             notes.append(
                 f"χ² per degree of freedom is {chi2:.3g}: {model} does not describe these scans, or their errors are too "
