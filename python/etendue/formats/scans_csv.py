@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -22,6 +23,7 @@ POLAR = ("theta_s", "phi_s", "flux")
 STAGES = ("alpha", "beta", "gamma", "delta", "flux")
 ERROR = "standard_error"
 LARGEST = 1 << 28
+DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 
 
 def read_columns(path: Path, layouts: Sequence[tuple[str, ...]]) -> dict[str, Array]:
@@ -44,6 +46,7 @@ def read_columns(path: Path, layouts: Sequence[tuple[str, ...]]) -> dict[str, Ar
         data = file.read(LARGEST + 1)
     if len(data) > LARGEST:
         raise FormatError(path, "length", "more than 256 MiB", "No scan is so large.")
+    _require_text(path, data)
     lines = [(at, line) for at, line in enumerate(decoded(path, data).splitlines(), 1) if line.strip()]
     lines = [(at, line) for at, line in lines if not line.lstrip().startswith("#")]
     wanted = " or ".join(",".join(layout) for layout in layouts)
@@ -69,11 +72,35 @@ def read_columns(path: Path, layouts: Sequence[tuple[str, ...]]) -> dict[str, Ar
         except ValueError:
             values = [np.nan]
         if not np.isfinite(values).all():
-            raise FormatError(path, f"line {at}", "a field that is no finite number", "Mend the line.")
+            raise FormatError(path, f"line {at}", *_no_number(fields))
         rows.append(values)
     if not rows:
         raise FormatError(path, f"line {lines[0][0]}", "no values follow", "Export the scan again.")
-    return dict(zip(names, np.array(rows).T, strict=True))
+    columns = dict(zip(names, np.array(rows).T, strict=True))
+    if (columns.get(ERROR, np.zeros(1)) < 0.0).any():
+        at = int(np.argmax(columns[ERROR] < 0.0))
+        found = f"a standard error of {columns[ERROR][at]:g}"
+        raise FormatError(
+            path, f"line {lines[at + 1][0]}", found, "Errors are not below 0: state how far off it may be."
+        )
+    return columns
+
+
+def _require_text(path: Path, data: bytes) -> None:
+    """Refuse what was compressed."""
+    kinds = ((b"\x1f\x8b", "compressed by gzip", "gunzip"), (b"PK\x03\x04", "a ZIP archive, or a workbook", "unzip"))
+    for start, what, how in kinds:
+        if data.startswith(start):
+            advice = f"Unpack it first ({how}), or save the sheet as CSV: a scan is read from plain text."
+            raise FormatError(path, "first bytes", what, advice)
+
+
+def _no_number(fields: Sequence[str]) -> tuple[str, str]:
+    """What is wrong with a line, and what to do."""
+    comma = next((field.strip() for field in fields if DECIMAL_COMMA.fullmatch(field.strip())), None)
+    if comma is not None:
+        return f"{comma[:40]!r} has a decimal comma", "Write numbers with a point: 0.5, not 0,5."
+    return "a field that is no finite number", "Mend the line."
 
 
 def read_remarks(path: Path) -> dict[str, str]:

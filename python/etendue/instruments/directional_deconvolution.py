@@ -38,6 +38,9 @@ DirectionalMethod = Literal["richardson-lucy", "total-variation", "parametric", 
 REPLICATES = 24
 """Scans that error bands are made of."""
 
+SAME_ANGLE = 1e-3
+"""By which the solid angles of a scan and of its instrument may differ, relative to it."""
+
 FEWEST = 9
 """Positions that are needed."""
 
@@ -306,6 +309,12 @@ def _doubts(scan: DirectionalScan, instrument: Instrument) -> list[str]:
     found = []
     if isinstance(instrument, RoundBlur):
         found.append("of the instrument its instrument function alone is known: exact about the regular direction only")
+    stated, known = scan.solid_angle, instrument.solid_angle
+    if stated is not None and abs(stated - known) > SAME_ANGLE * known:
+        found.append(
+            f"the scan states a solid angle of {stated:.4g} sr, its instrument has {known:.4g} sr: f is by the latter, the "
+            f"scan's own values are {known / stated:.3g} times as large"
+        )
     below = scan.flux + scan.background < 0.0
     if below.any():
         found.append(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -25,6 +26,12 @@ Way = Literal["transmitted", "reflected"]
 
 FINE = 16
 """Parts of a step between positions in which the total scatter is added up."""
+
+REMARKS = ("incidence", "background", "solid_angle", "way", "plane", "sample")
+"""What lines of a file may say of a scan; others are remarks of people."""
+
+ALIKE = 0.8
+"""How alike a line is to one of these to be a slip of it, and no remark."""
 
 SAME_STEP = 1e-3
 """By which steps may differ, relative to the smallest, and still be the same: angles in files have few digits."""
@@ -350,6 +357,10 @@ def known_of(path: Path, remarks: Mapping[str, str]) -> dict[str, object]:
         If a value is none that is possible.
     """
     found: dict[str, object] = {}
+    for key in sorted(remarks.keys() - set(REMARKS)):
+        (near, *_) = (*difflib.get_close_matches(key, REMARKS, 1, ALIKE), None)
+        if near is not None:
+            raise FormatError(path, f"# {key[:40]}", "no such line", f"Did you mean '# {near} = …'?")
     for key in ("incidence", "background", "solid_angle"):
         if key in remarks:
             try:

@@ -29,6 +29,9 @@ GRID_FRAMES: tuple[str, ...] = get_args(GridFrame)
 GRAZING = 1e-9
 """Heights below which a direction lies in the surface."""
 
+SIDE = 1e-6
+"""Heights by which points may lie on the wrong side: rounding of files."""
+
 NORMAL = 1e-4
 """Angles of incidence [°] below which light comes along the normal, and from no azimuth."""
 
@@ -243,7 +246,8 @@ class BsdfSlice:
     Raises
     ------
     ArgumentError
-        If shapes do not fit, or a value is infinite.
+        If shapes do not fit, a value is infinite, a solid angle is below 0, or a point lies on the side to which this light
+        does not go.
 
     Examples
     --------
@@ -282,12 +286,28 @@ class BsdfSlice:
             raise ArgumentError("values of a BSDF are finite, or NaN where nothing was measured")
         if self.projected is not None and self.projected.shape != shape:
             raise ArgumentError("projected solid angles have the shape of the values")
+        if self.projected is not None and (self.projected < 0.0).any():
+            raise ArgumentError("projected solid angles are not below 0 sr: they are those of patches, times |cos θ|")
+        if self.points is not None:
+            self._require_side(self.points)
         if self.standard_error is not None and self.standard_error.shape != self.values.shape:
             raise ArgumentError("standard errors have the shape of the values")
         if self.standard_error is not None and (self.standard_error < 0.0).any():
             raise ArgumentError("standard errors are not below 0, or NaN where none is known")
         if self.wavelength is not None and not 0.0 < self.wavelength < math.inf:
             raise ArgumentError(f"the wavelength of a slice is {self.wavelength} nm; give a length above 0, or None")
+
+    def _require_side(self, points: Array) -> None:
+        """Refuse directions to where this light does not go."""
+        behind = (self.incident[2] > 0.0) == self.transmitted
+        wrong = points[:, 2] * (-1.0 if behind else 1.0) < -SIDE
+        if wrong.any():
+            way, where = ("transmitted", "other") if self.transmitted else ("reflected", "lit")
+            at = int(np.argmax(wrong))
+            raise ArgumentError(
+                f"points[{at}] is {points[at].tolist()}; {way} light leaves on the {where} side of the surface: sort the "
+                "points by side, or state transmitted"
+            )
 
     @property
     def theta(self) -> float:

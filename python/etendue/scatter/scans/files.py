@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,12 +12,15 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.rt300s import is_rt300s, read_rt300s
-from etendue.formats.scans_csv import DIRECTIONS, ERROR, STAGES, read_columns
+from etendue.formats.scans_csv import DIRECTIONS, ERROR, STAGES, read_columns, read_remarks
 from etendue.quantities.bsdf_data import direction
 from etendue.scatter.scans.goniometer import bsdf_of_flux, detector_direction, incident_direction
 from etendue.scatter.scans.scans import Scans
 
 Array = npt.NDArray[np.float64]
+
+SAME = 1e-3
+"""By which two statements of a solid angle may differ, relative to it."""
 
 SHADOW = 7.5
 """Angle between detector and light [°] below which the one is in the way of the other."""
@@ -56,7 +60,8 @@ def read_scans(
     FormatError, OSError
         If a file cannot be read.
     ArgumentError
-        If files of stages come without incident flux and solid angle, or values are impossible.
+        If files of stages come without incident flux and solid angle, some files have standard errors and others none, or
+        values are impossible.
 
     Examples
     --------
@@ -90,6 +95,7 @@ def read_scans(
         else:
             if incident_flux is None or solid_angle is None:
                 raise ArgumentError(f"{path} holds stages and fluxes: state the incident flux and the solid angle too")
+            _require_same(Path(path), solid_angle)
             arriving = float(read_columns(Path(incident_flux), (STAGES,))["flux"].mean())
             stages = [columns[name] for name in STAGES[:4]]
             i, s = incident_direction(stages[2], stages[3]), detector_direction(*stages)
@@ -104,7 +110,7 @@ def read_scans(
         scattered.append(s)
         values.append(f)
         errors.append(error)
-    whole = all(error is not None for error in errors)
+    whole = _all_or_none([Path(path) for path in paths], errors)
     return Scans(
         np.concatenate(incident),
         np.concatenate(scattered),
@@ -113,6 +119,30 @@ def read_scans(
         reflectance,
         transmittance,
     )
+
+
+def _all_or_none(paths: Sequence[Path], errors: Sequence[Array | None]) -> bool:
+    """Whether standard errors are known; refuses files of which only some have them."""
+    known = [error is not None for error in errors]
+    if any(known) and not all(known):
+        one, other = paths[known.index(True)], paths[known.index(False)]
+        raise ArgumentError(
+            f"{one} has standard errors and {other} has none: give a column {ERROR} in all files, or in none, since fits "
+            "weigh all values by their errors"
+        )
+    return all(known)
+
+
+def _require_same(path: Path, solid_angle: float) -> None:
+    """Refuse a file that says another solid angle than was stated."""
+    said = read_remarks(path).get("solid_angle")
+    try:
+        own = solid_angle if said is None else float(said)
+    except ValueError:
+        own = math.nan
+    if not abs(own - solid_angle) <= SAME * solid_angle:
+        found = f"{str(said)[:40]} sr, and {solid_angle:g} sr is stated"
+        raise FormatError(path, "# solid_angle", found, "State the solid angle of this file, or mend its line.")
 
 
 def _check_angles(path: Path, columns: dict[str, Array]) -> None:
