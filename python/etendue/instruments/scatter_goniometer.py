@@ -81,8 +81,8 @@ class ScatterGoniometer:
     drift : number
         By which share the beam has changed at the last position.
     head_diameter : number
-        Of the head of the detector [mm], which shadows the sample where it gets into the beam: scans in two dimensions leave
-        these positions out.
+        Of the head of the detector [mm], which shadows the sample where it gets into the beam: these positions are left
+        out, and NaN over a hemisphere.
 
     Raises
     ------
@@ -252,10 +252,14 @@ class ScatterGoniometer:
         angle = angle[np.abs(angle) < 90.0]
         behind = way == "transmitted"
         arms = detector_directions(angle, theta, plane, behind=behind)
-        flux, error = self._flux(bsdf, arms, theta, rays, seed, method, behind=behind, fresh=fresh)
         notes: tuple[str, ...] = ()
         if method == "trace" and not fresh and self.photons is None:
             notes = (SHARED,)
+        shadowed = self._shadowed(arms, theta)
+        if shadowed.any():
+            notes = (*notes, _left_out(shadowed))
+            angle, arms = angle[~shadowed], arms[~shadowed]
+        flux, error = self._flux(bsdf, arms, theta, rays, seed, method, behind=behind, fresh=fresh)
         return self._noisy(angle, flux, error, seed, incidence=theta, way=way, plane=plane, sample=True, notes=notes)
 
     def flux_at(
@@ -324,7 +328,8 @@ class ScatterGoniometer:
         Returns
         -------
         BsdfSlice
-            F [1/sr] by eq. 5.1 on a grid of azimuths and angles from the normal, with its standard error.
+            F [1/sr] by eq. 5.1 on a grid of azimuths and angles from the normal, with its standard error; NaN where the head
+            of the detector stands in the beam.
         """
         way = _way(bsdf, way)
         behind = way == "transmitted"
@@ -333,6 +338,7 @@ class ScatterGoniometer:
         flux, error = self.flux_at(bsdf, flat, theta, rays, seed, method=method)
         flux, error = self._with_noise(flux, error, seed)
         per = self.solid_angle * np.abs(flat[:, 2])
+        flux[self._shadowed(flat, theta)] = np.nan
         shape = grid.shape
         return BsdfSlice(
             light_from(theta, 180.0),
@@ -385,14 +391,10 @@ class ScatterGoniometer:
         sample = TurnedSample(bsdf, turn) if turn else bsdf
         arms = np.array(directions, np.float64)
         checked = DirectionalScan(arms, np.zeros(len(arms)), incidence=theta)
-        shadowed = arms @ checked.incident > np.cos(np.arcsin(min(self._shadow, 1.0))) if self._shadow else None
+        shadowed = self._shadowed(arms, theta)
         notes = [] if method != "trace" or fresh or self.photons is not None else [SHARED]
-        if shadowed is not None and shadowed.any():
-            if shadowed.all():
-                raise ArgumentError("the head of the detector stands in the beam at all positions")
-            notes.append(
-                f"{int(shadowed.sum())} positions are left out: the head of the detector stands in the beam there"
-            )
+        if shadowed.any():
+            notes.append(_left_out(shadowed))
             arms = arms[~shadowed]
         flux, error = self._flux(sample, arms, theta, rays, seed, method, behind=checked.behind, fresh=fresh)
         flux, error = self._with_noise(flux, error, seed)
@@ -454,6 +456,12 @@ class ScatterGoniometer:
         """Sine of the angle from the incident beam within which the head of the detector is in it; 0: it has no head."""
         return 0.5 * (self.head_diameter + self.beam_diameter) / self.distance if self.head_diameter else 0.0
 
+    def _shadowed(self, arms: Array, theta: float) -> npt.NDArray[np.bool_]:
+        """At which positions the head of the detector stands in the beam, shape (n,)."""
+        if not self._shadow:
+            return np.zeros(len(arms), bool)
+        return np.asarray(arms @ light_from(theta, 180.0) > np.cos(np.arcsin(min(self._shadow, 1.0))))
+
     def _flux(
         self,
         bsdf: Bsdf | None,
@@ -513,6 +521,13 @@ class ScatterGoniometer:
             sample=sample,
             notes=notes,
         )
+
+
+def _left_out(shadowed: npt.NDArray[np.bool_]) -> str:
+    """What is to be told of positions in the shadow of the head."""
+    if shadowed.all():
+        raise ArgumentError("the head of the detector stands in the beam at all positions")
+    return f"{int(shadowed.sum())} positions are left out: the head of the detector stands in the beam there"
 
 
 def _require_incidence(theta: float) -> None:
