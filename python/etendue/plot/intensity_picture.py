@@ -134,9 +134,11 @@ def plot_intensity(
             raise ArgumentError(f"{intensity.unit} cannot be drawn as cd/klm: that takes a luminous flux above 0.")
         unit, factor = "cd/klm", sheet.per_klm
     reach = _reach(intensity)
-    ends = {one.plane: (one.left, one.right) for one in sheet.beam if 0.0 < one.angle < 360.0}
+    ends: dict[float, tuple[float, ...]] = {one.plane: () for one in sheet.beam}
+    for one in sheet.beam:
+        ends[one.plane] += (one.left, one.right) if 0.0 < one.angle < 360.0 else ()
     curves = [
-        curve.times(factor)._replace(edges=ends.get(90.0 * number, ()) if number < len(sheet.beam) else ())
+        curve.times(factor)._replace(edges=ends.get(90.0 * number, ()) if number < len(ends) else ())
         for number, curve in enumerate(_curves(intensity, reach))
     ]
     draw, high = (_polar, (4.5 if reach > 90.0 else 2.55)) if kind == "polar" else (_cartesian, 3.0)

@@ -51,6 +51,8 @@ class BeamAngle:
     left, right : float
         γ of the edges [°]; negative in the half plane C + 180°. If the light is about γ = 180°, the angle lies on that
         side: 360° less what is between the edges over γ = 0.
+    about : float
+        γ of the axis that the angle goes over [°], 0 or 180.
 
     Examples
     --------
@@ -64,6 +66,7 @@ class BeamAngle:
     standard_error: float
     left: float
     right: float
+    about: float = 0.0
 
     def __str__(self) -> str:
         """The angle with its error, or that there is none.
@@ -82,13 +85,18 @@ class BeamAngle:
 
 
 def beam_angle(
-    intensity: Intensity, c: float = 0.0, share: float = BEAM, reference: Reference = "maximum"
+    intensity: Intensity,
+    c: float = 0.0,
+    share: float = BEAM,
+    reference: Reference = "maximum",
+    about: float | None = None,
 ) -> BeamAngle:
     """The angle that holds all directions of a plane whose intensity is above a share of the largest.
 
     It goes over γ = 0, or over γ = 180° where there is light above the share in that direction and not at γ = 0. With a
     share of 50 % it is the beam angle, with 10 % the field angle. It is measured from edge to edge, so that a distribution
-    with a dark middle has the angle of its outer edges.
+    with a dark middle has the angle of its outer edges. Light above the share on both sides of the horizon, γ = 90°, and
+    below it at the horizon is that of two beams: the angle is that of the one about γ = 0; `about` tells the other.
 
     In noise, an edge is where the outermost value stands that is above the limit by three standard errors, plus the angle
     beyond it that is above the limit: there, noise lifts as much light over the limit as it pushes below.
@@ -104,6 +112,9 @@ def beam_angle(
     reference : {"maximum", "centre"}
         The largest intensity of all directions (`Intensity.peak_intensity`), or that on the axis, γ = 0, as IEC TR 61341
         has it for reflector lamps [IEC2010]_.
+    about : float, optional
+        γ of the axis, 0 or 180: the angle is that of the light on this side of the horizon alone, and its reference the
+        largest intensity there, or that on this axis. None for all light, as told above.
 
     Returns
     -------
@@ -114,7 +125,7 @@ def beam_angle(
     Raises
     ------
     ArgumentError
-        If the share is not between 0 and 1, or the plane is not finite.
+        If the share is not between 0 and 1, the plane is not finite, or `about` is neither 0 nor 180.
     UnknownNameError
         If there is no such reference.
 
@@ -137,23 +148,27 @@ def beam_angle(
         raise UnknownNameError("reference of a beam angle", reference, REFERENCES)
     if not math.isfinite(c):
         raise ArgumentError(f"beam_angle: the plane is C = {c}; give an angle in degrees.")
-    if reference == "maximum":
-        top, top_error = intensity.peak_intensity, intensity.peak_error
-    else:
-        top = float(intensity.planes([c])[0, 0]) if intensity.gamma[0] == 0.0 else 0.0
-        top_error = float(_plane_errors(intensity, [c])[0, 0])
+    if about not in (None, 0.0, 180.0):
+        raise ArgumentError(f"beam_angle: the axis is γ = {about}; give 0 or 180.")
     plane = float(np.mod(c, 360.0))
     plane -= 180.0 if plane >= 180.0 else 0.0
     curve = _signed(intensity, plane)
-    upwards = _lit(curve, 180.0) >= share * top > _lit(curve, 0.0)
+    if reference == "maximum":
+        side = (90.0 if about == 180.0 else 0.0, 90.0 if about == 0.0 else 180.0)
+        top, top_error = intensity.largest_between(*side)
+    else:
+        top, top_error = _on_axis(intensity, plane, about or 0.0)
+    upwards = about == 180.0 if about is not None else _lit(curve, 180.0) >= share * top > _lit(curve, 0.0)
     if upwards:
         curve = _from_above(curve)
+    if about is not None or _two_beams(curve, share * top):
+        curve = _up_to_the_horizon(curve)
     left, right = (
         float(edge[0]) for edge in _edges(curve.gamma, curve.values[None], curve.errors, np.array([share * top]))
     )
     error = _angle_error(intensity, plane, curve, (share * top, share * top_error), upwards)
     ends = [math.copysign(180.0, edge) - edge for edge in (left, right)] if upwards else [left, right]
-    return BeamAngle(plane, share, right - left, error, *ends)
+    return BeamAngle(plane, share, right - left, error, *ends, about=180.0 if upwards else 0.0)
 
 
 def cut_off_angle(intensity: Intensity, share: float = CUT_OFF) -> float:
@@ -227,6 +242,36 @@ def _signed(intensity: Intensity, plane: float) -> _Curve:
 def _lit(curve: _Curve, gamma: float) -> float:
     """The largest value at an angle from the axis, in both half planes; 0 beside the table."""
     return float(curve.values[np.abs(curve.gamma) == gamma].max(initial=0.0))
+
+
+def _on_axis(intensity: Intensity, plane: float, about: float) -> tuple[float, float]:
+    """Intensity on the axis γ = `about`, and its error; 0 beside the table."""
+    (row,) = np.nonzero(intensity.gamma == about)
+    if not row.size:
+        return 0.0, 0.0
+    return float(intensity.planes([plane])[0, row[0]]), float(_plane_errors(intensity, [plane])[0, row[0]])
+
+
+def _two_beams(curve: _Curve, limit: float) -> bool:
+    """Whether light is above the limit on both sides of the horizon, and below it at the horizon."""
+    bright = curve.values >= limit
+    front = np.abs(curve.gamma) < 90.0
+    at_horizon = max(_at(curve, curve.values, angle) for angle in (-90.0, 90.0))
+    return bool(at_horizon < limit and bright[front].any() and bright[np.abs(curve.gamma) > 90.0].any())
+
+
+def _up_to_the_horizon(curve: _Curve) -> _Curve:
+    """The plane from −90° to 90°."""
+    inner = np.abs(curve.gamma) < 90.0
+    values, errors = (
+        np.concatenate([[_at(curve, rows, -90.0)], rows[inner], [_at(curve, rows, 90.0)]])
+        for rows in (curve.values, curve.errors)
+    )
+    return _Curve(np.concatenate([[-90.0], curve.gamma[inner], [90.0]]), values, errors)
+
+
+def _at(curve: _Curve, rows: Array, gamma: float) -> float:
+    return float(np.interp(gamma, curve.gamma, rows))
 
 
 def _from_above(curve: _Curve) -> _Curve:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from etendue.quantities.arguments import INTENSITY, require
-from etendue.quantities.beam_angle import FIELD, BeamAngle, beam_angle, cut_off_angle
+from etendue.quantities.beam_angle import BEAM, FIELD, BeamAngle, beam_angle, cut_off_angle
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.measured import measured
 from etendue.quantities.zonal_flux import zonal_flux
@@ -27,7 +27,8 @@ class DataSheet:
     ----------
     beam, field : tuple of BeamAngle
         At 50 % and at 10 % of the largest intensity, in C0–C180 and C90–C270; one of each if the distribution is
-        rotationally symmetric.
+        rotationally symmetric. Of light on both sides of the horizon that is dark there, those about γ = 0 and then those
+        about γ = 180°, each of the largest intensity on its side.
     cut_off : float
         γ from which on no plane sends more than 1 % of the largest intensity [°]; NaN where that is not known to be above 0.
     zones : tuple of (float, float, float, float)
@@ -125,6 +126,7 @@ def data_sheet(intensity: Intensity) -> DataSheet:
     """
     require(intensity, Intensity, "data_sheet: intensity", INTENSITY)
     planes = (0.0,) if intensity.symmetry() == "rotational" else (0.0, 90.0)
+    axes = (0.0, 180.0) if _two_beams(intensity) else (None,)
     steps = np.arange(0.0, 180.1, 10.0)
     flux, error = zonal_flux(intensity, steps)
     down, total = zonal_flux(intensity, FLUX_CODE_ZONES)[0], intensity.flux
@@ -141,8 +143,8 @@ def data_sheet(intensity: Intensity) -> DataSheet:
     factor = per_klm if math.isfinite(per_klm) else 1.0
     largest = [(low, intensity.largest_between(low, 90.0)) for low in (65.0, 70.0, 80.0, 90.0)]
     return DataSheet(
-        beam=tuple(beam_angle(intensity, c) for c in planes),
-        field=tuple(beam_angle(intensity, c, FIELD) for c in planes),
+        beam=tuple(beam_angle(intensity, c, about=axis) for axis in axes for c in planes),
+        field=tuple(beam_angle(intensity, c, FIELD, about=axis) for axis in axes for c in planes),
         cut_off=cut_off_angle(intensity),
         zones=tuple(
             (float(low), float(high), float(one), float(off))
@@ -153,6 +155,13 @@ def data_sheet(intensity: Intensity) -> DataSheet:
         glare=tuple((low, factor * found.value, factor * found.error) for low, found in largest),
         flux_unit=intensity.flux_unit,
     )
+
+
+def _two_beams(intensity: Intensity) -> bool:
+    """Whether both sides of the horizon have a tenth of the peak, and the horizon less than half of what the darker has."""
+    sides = [intensity.largest_between(*side).value for side in ((0.0, 90.0), (90.0, 180.0))]
+    horizon = intensity.largest_between(90.0, 90.0).value
+    return min(sides) >= FIELD * max(sides) > 0.0 and horizon < BEAM * min(sides)
 
 
 def _lamp_flux(intensity: Intensity) -> float | None:
@@ -170,6 +179,10 @@ def _known(value: float) -> float | None:
 
 
 def _angles(found: Sequence[BeamAngle]) -> str:
-    if len(found) == 1:
-        return str(found[0])
-    return ", ".join(f"{one} in C{one.plane:.4g}–C{one.plane + 180:.4g}" for one in found)
+    planes, axes = len({one.plane for one in found}), {one.about for one in found}
+    return ", ".join(
+        str(one)
+        + (f" in C{one.plane:.4g}–C{one.plane + 180:.4g}" if planes > 1 else "")
+        + (f" about γ = {one.about:g}°" if len(axes) > 1 else "")
+        for one in found
+    )

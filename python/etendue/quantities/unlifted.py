@@ -21,7 +21,12 @@ stated nodes; with all of them they are half an error too low."""
 
 
 class Unlifted(NamedTuple):
-    """The largest of values without the lift of chance, and its standard error; NaN where no error is known."""
+    """The largest of values without the lift of chance, and its standard error; NaN where no error is known.
+
+    Examples
+    --------
+    >>> value, error = Unlifted(500.0, 20.0)
+    """
 
     value: float
     error: float
