@@ -94,14 +94,14 @@ def test_light_upwards_is_as_wide_as_the_same_light_downwards(c: float, share: f
 def test_light_both_ways_is_two_beams_if_the_horizon_is_dark() -> None:
     """cos³ γ down and 0.4 |cos γ| up: 2 arccos of the third root of the share, and 2 arccos of the share, each of its own
     largest. With an even light of 1.2 over them, the horizon has more than half of the peak, and all is one beam."""
-    gamma = np.arange(0.0, 180.05, 0.1)
+    gamma = np.arange(0.0, 180.1, 0.2)
     cosine = np.cos(np.radians(gamma))
     values = np.where(gamma < 90.0, np.abs(cosine) ** 3, 0.4 * np.abs(cosine))
     both = et.Intensity([0], gamma, [values], 1e-6)
     for share in (0.5, 0.1):
         down, up = 2 * np.degrees(np.arccos([share ** (1 / 3), share]))
         front, back = (beam_angle(both, share=share, about=about) for about in (0.0, 180.0))
-        assert (front.angle, back.angle) == (pytest.approx(down, abs=2e-3), pytest.approx(up, abs=2e-3))
+        assert (front.angle, back.angle) == (pytest.approx(down, abs=4e-3), pytest.approx(up, abs=4e-3))
         assert (front.about, back.about) == (0.0, 180.0)
         assert (back.left, back.right) == (pytest.approx(up / 2 - 180.0), pytest.approx(180.0 - up / 2))
         # The limit of both is that of the larger one, which only at 10 % is passed by the other.

@@ -167,8 +167,8 @@ def beam_angle(
         float(edge[0]) for edge in _edges(curve.gamma, curve.values[None], curve.errors, np.array([share * top]))
     )
     error = _angle_error(intensity, plane, curve, (share * top, share * top_error), upwards)
-    ends = [math.copysign(180.0, edge) - edge for edge in (left, right)] if upwards else [left, right]
-    return BeamAngle(plane, share, right - left, error, *ends, about=180.0 if upwards else 0.0)
+    first, last = (math.copysign(180.0, edge) - edge for edge in (left, right)) if upwards else (left, right)
+    return BeamAngle(plane, share, right - left, error, first, last, 180.0 if upwards else 0.0)
 
 
 def cut_off_angle(intensity: Intensity, share: float = CUT_OFF) -> float:
