@@ -56,6 +56,12 @@ CALLS: dict[str, tuple[Callable[[Any], object], tuple[Any, ...]]] = {
         ([(0, 0, 1), (1, 0, 1), (0, 1, 1)], None, 3, [1, 2, 3], "0/0,1/0,0/1"),
     ),
     "Disk: radius": (lambda wrong: et.Disk(radius=wrong), ("3", LMAP, ["3"])),
+    "write_rays: path": (lambda wrong: et.write_rays(wrong, et.RingSource(rays=10)), (et.RingSource(rays=10), None)),
+    "write_rays: rays": (lambda wrong: et.write_rays("a.tm25ray", wrong), ("b.tm25ray", None, LMAP)),
+    "plot_sweep: table": (et.plot_sweep, ("a.csv", None)),
+    "plot_animation": (lambda wrong: et.plot_animation(wrong, "a.gif"), (LMAP, None, ["a.npz", "b.npz"])),
+    "deconvolve: scan": (lambda wrong: et.deconvolve(wrong, wrong), ("scan.csv", None, LMAP)),
+    "deconvolve_directions: scan": (et.deconvolve_directions, ("scan.csv", None, LMAP)),
     "path is": (et.read_rays, (None, 3.5, [])),
 }
 """By what the message begins with or names: a call, and what it refuses."""

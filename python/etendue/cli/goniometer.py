@@ -200,7 +200,8 @@ def goniometer(
         say(f"instrument function: {half_width(scan.fwhm)}")
     else:
         say(f"peak {counted(float(scan.bsdf.max()), '1/sr')}, {half_width(scan.fwhm)}")
-        say(f"total scatter {scan.total_scatter:.4f}, if the lobe is round in direction cosines and the scan reaches its end")
+        told = "if the lobe is round in direction cosines and the scan reaches its end"
+        say(f"total scatter {scan.total_scatter:.4f}, {told}")
     if output is not None:
         say(f"{output}: written")
 

@@ -16,6 +16,7 @@ from etendue.instruments.courses import after, course_of, rule_of
 from etendue.instruments.goniometer_scan import GoniometerScan, full_width, summit, total_scatter
 from etendue.instruments.operators import Operator, OperatorName, folded, middle_of, operator_of, sparse_if_large
 from etendue.instruments.penalised_lobe import PenalisedLobe, penalised_lobe
+from etendue.quantities.arguments import require
 from etendue.quantities.ray_stream import checked_seed
 
 Array = npt.NDArray[np.float64]
@@ -201,6 +202,8 @@ def deconvolve(
         raise UnknownNameError("method", method, get_args(Method))
     if stop is not None and method not in {None, "richardson-lucy"}:
         raise ArgumentError(f"a stop is for method='richardson-lucy'; {method!r} does not iterate")
+    for name, given in (("scan", scan), ("signature", signature)):
+        require(given, GoniometerScan, f"deconvolve: {name}", "a GoniometerScan: of a file et.read_goniometer_scan(path)")
     notes = list(scan.notes)
     if scan.angle.size < 5:
         raise ArgumentError(f"a scan of {scan.angle.size} positions; five are needed at least")

@@ -28,6 +28,7 @@ from etendue.instruments.regular_share import RegularShare, regular_share
 from etendue.instruments.round_blur import RoundBlur
 from etendue.instruments.scatter_goniometer import ScatterGoniometer
 from etendue.instruments.total_variation import STRENGTHS, total_variation
+from etendue.quantities.arguments import require
 from etendue.quantities.bsdf_data import BsdfSlice
 from etendue.quantities.ray_stream import checked_seed
 from etendue.scatter.lobe_models import LOBE_MODELS, Fitted
@@ -241,6 +242,11 @@ def deconvolve_directions(
     if replicates and replicates < 2:
         raise ArgumentError("one replicate has no spread; draw two or more, or none")
     seed = checked_seed(seed)
+    require(scan, DirectionalScan, "deconvolve_directions: scan", "a DirectionalScan: et.read_directional_scan(path)")
+    if instrument is not None:
+        wanted = "a ScatterGoniometer, or a scan of the bare beam: of a file et.read_goniometer_scan(path)"
+        kinds = (ScatterGoniometer, Bench, GoniometerScan)
+        require(instrument, kinds, "deconvolve_directions: instrument", wanted)
     of = _instrument(scan, instrument)
     notes = [*scan.notes, *_doubts(scan, of)]
     model = forward_model(of, scan, cell)

@@ -182,11 +182,11 @@ def check_region(given: object, asker: str) -> None:
 
     Examples
     --------
-    >>> check_region((-1, 1, -2, 2), "compare")
+    >>> check_region(5, "plot")
     Traceback (most recent call last):
-    etendue.errors.ArgumentError: compare: region is a tuple; give et.Region(left, right, bottom, top) or an et.PolygonRegion.
+    etendue.errors.ArgumentError: plot: region is 5; give et.Region(left, right, bottom, top) or et.PolygonRegion(…).
     """
-    instead = "et.Region(left, right, bottom, top) or an et.PolygonRegion"
+    instead = "et.Region(left, right, bottom, top) or et.PolygonRegion(…)"
     require(given, (Region, PolygonRegion), f"{asker}: region", instead)
 
 

@@ -14,7 +14,8 @@ from etendue.plot import style
 from etendue.plot.animation_files import COLOURS, Frame, Writing, writer_for
 from etendue.plot.colour_scale import Scale, choose_scale, colour_map, normalisation
 from etendue.plot.map_picture import MapLayout, axis_names, draw_colour_bar, draw_screen
-from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.arguments import require, require_number
+from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map
 
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap
@@ -75,6 +76,10 @@ def plot_animation(
     ...     (Path(folder) / "lamp.gif").stat().st_size > 1000
     True
     """
+    require(maps, (list, tuple), "plot_animation: maps", "a list of two LuminanceMaps or more")
+    for lmap in maps:
+        check_luminance_map(lmap, "plot_animation")
+    require_number(seconds, "plot_animation: seconds", "how long a map stays, 0.02 to 60")
     writer = writer_for(path)
     if not 0.02 <= seconds <= 60.0:
         raise ArgumentError(f"plot_animation: seconds is {seconds!r}; give how long a map stays, 0.02 to 60.")

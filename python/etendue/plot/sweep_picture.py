@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.plot import style
+from etendue.quantities.arguments import require
 from etendue.quantities.powers_of_ten import common_power, ten_to
 from etendue.sweeps.table import SweepTable
 from etendue.units import (
@@ -116,6 +117,7 @@ def plot_sweep(
     >>> figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()
     ('lens.at.2 [mm]', 'maximum [cd/m²]')
     """
+    require(table, SweepTable, "plot_sweep: table", "what et.sweep(scene, parameters, measure) gives")
     panels = _panels(table)
     heading = title if title is not None else style.headed("Sweep", table.provenance.source)
     if ax is not None:
