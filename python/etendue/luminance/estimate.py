@@ -12,7 +12,7 @@ from etendue.lightfield.light_field import LightField
 from etendue.lightfield.pilot_sample import check_near_field
 from etendue.lightfield.surfaces import Surface
 from etendue.luminance.cone_map import look_through_cone
-from etendue.luminance.framing import framed_screens, missed_notes, probe, shows_whole
+from etendue.luminance.framing import beyond_notes, framed_screens, is_far, missed_notes, probe, shows_whole
 from etendue.luminance.looking import look_at_field
 from etendue.luminance.methods import AnyMethod, Cone, FromField, MethodName, PathTracing, choose_method, kind_of_source
 from etendue.luminance.opening import open_source
@@ -298,11 +298,12 @@ def _observer(given: Any, own: Mapping[str, ObserverKeys]) -> tuple[Observer, Sc
 
 
 def _with_missed(source: RayStream | LightField, maps: list[LuminanceMap]) -> list[LuminanceMap]:
-    """The maps, with a note where a screen misses much of the light."""
+    """The maps, with a note where a screen misses much of the light, or shows light that starts beyond the observer."""
     if not source.total_flux > 0.0:
         return maps
-    if isinstance(source, LightField) and all(shows_whole(source, lmap) for lmap in maps):
+    if isinstance(source, LightField) and all(shows_whole(source, lmap) and is_far(source, lmap) for lmap in maps):
         return maps
     some = probe(source)
-    notes = [missed_notes(some, lmap.observer, lmap.screen) for lmap in maps]
+    views = [(lmap.observer, lmap.screen) for lmap in maps]
+    notes = [(*missed_notes(some, *view), *beyond_notes(some, *view)) for view in views]
     return [lmap.replace(notes=(*lmap.notes, *more)) if more else lmap for lmap, more in zip(maps, notes, strict=True)]

@@ -37,11 +37,20 @@ SHOWN = 0.995
 MARGIN = 1.1
 """How much larger than that the screen is."""
 
+FEW_STARTS = 256
+"""Rays drawn from a field to tell where its light starts."""
+
 POINTS = 48
 """Points along each coordinate of a part over which the intensity of a field towards an observer is summed."""
 
 CLOSE = 0.03
 """Share of it below which a map need not be looked at more closely: quadrature, and observers that are near."""
+
+FEW_SEEN = 30
+"""Rays that tell a share to a tenth or so."""
+
+MOST_BEYOND = 0.01
+"""Share of the light on a screen that may start beyond the observer without a note."""
 
 MOST_MISSED = 0.1
 """Share of the light towards the observer that a screen may miss without a note."""
@@ -203,6 +212,12 @@ def shows_whole(field: LightField, lmap: LuminanceMap) -> bool:
     return lmap.intensity > (1.0 - CLOSE) * intensity
 
 
+def is_far(field: LightField, lmap: LuminanceMap) -> bool:
+    """Whether the observer is farther from his target than the light of the field starts."""
+    away = np.linalg.norm(field.sample(FEW_STARTS).position - np.asarray(lmap.observer.target), axis=1)
+    return bool(away.max() < lmap.observer.distance)
+
+
 def centre_of_light(rays: RaySet) -> tuple[float, float, float]:
     """The point to look at [mm]: the one that the lines of the rays come closest to, or the middle of where they start.
 
@@ -219,6 +234,45 @@ def centre_of_light(rays: RaySet) -> tuple[float, float, float]:
     step = 10.0 ** np.floor(np.log10(max(_quantile(off, rays.flux), 1e-6))) / 10.0
     x, y, z = np.round(point / step) * step + 0.0
     return (float(f"{x:.12g}"), float(f"{y:.12g}"), float(f"{z:.12g}"))
+
+
+def beyond_notes(rays: RaySet, observer: Observer, screen: Screen) -> tuple[str, ...]:
+    """What is to be said of rays that start beyond the observer, as seen from the screen, but whose lines pass him.
+
+    Where on its line a ray starts has no influence on a map: rays are often recorded on a surface about their source, which
+    may be wider than the observer is away. Of a second lamp behind him he would see nothing.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> lamps = et.RingSource(rays=200_000).ray_set()
+    >>> beyond_notes(lamps, et.Observer(0, 0, 300), et.Screen(60, 60, 1, 1))
+    ()
+    >>> beyond_notes(lamps.moved((0, 0, 600)), et.Observer(0, 0, 300), et.Screen(200, 200, 1, 1))[0][:56]
+    'about 100% of the light that the map shows starts beyond'
+    """
+    right, up, normal = screen.axes(observer)
+    start, direction = rays.position - np.asarray(observer.target), rays.direction
+    slope = direction @ normal
+    crossing = start - ((start @ normal) / np.where(slope == 0.0, np.nan, slope))[:, None] * direction
+    on_screen = (np.abs(crossing @ right) <= screen.width / 2) & (np.abs(crossing @ up) <= screen.height / 2)
+    towards = observer.position - np.asarray(observer.target) - crossing
+    cosine = np.einsum("ij,ij->i", towards, direction) / np.linalg.norm(towards, axis=1)
+    seen = (on_screen & (cosine > np.cos(np.radians(cone))) for cone in CONES)
+    shown = next(
+        (some for some in seen if some.sum() >= FEW_SEEN), on_screen & (cosine > np.cos(np.radians(CONES[-1])))
+    )
+    beyond = shown & (np.einsum("ij,ij->i", rays.position - observer.position, direction) > 0.0)
+    total = float(rays.flux[shown].sum())
+    share = float(rays.flux[beyond].sum()) / total if total > 0.0 else 0.0
+    if not share > MOST_BEYOND:
+        return ()
+    told = (
+        f"about {share:.0%} of the light that the map shows starts beyond the observer and is seen along the lines of its rays, "
+        "as if it came through the screen: right if they were recorded on a surface about their source, wrong of a lamp "
+        "that is behind him; leave that one out, or put both into a scene"
+    )
+    return (told,)
 
 
 def missed_notes(rays: RaySet, observer: Observer, screen: Screen) -> tuple[str, ...]:
