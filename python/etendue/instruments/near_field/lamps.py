@@ -46,6 +46,11 @@ LINES = 1 << 16
 LEAST = 4
 """Of a pixel."""
 
+OF_THE_FIELD = (
+    "the lamp is a light field: errors of the readings are those of the field in each pixel, as if independent; "
+    "where neighbours err together they are larger"
+)
+
 FEW = 1 << 12
 """Rays of a source that tell where it is."""
 
@@ -109,7 +114,7 @@ class FieldLamp(Lamp):
         self._field, self._samples, self._threads = field, samples, threads
         self._some = probe(field)
         self.name, self.flux_unit = field.provenance.source, field.flux_unit
-        self.provenance, self.notes = field.provenance, field.notes
+        self.provenance, self.notes = field.provenance, (*field.notes, OF_THE_FIELD)
 
     def centre(self) -> tuple[float, float, float]:
         """Where the light comes from."""
@@ -121,10 +126,12 @@ class FieldLamp(Lamp):
         return float(np.quantile(off, NEARLY_ALL)), float(off.max())
 
     def images(self, observers: Sequence[Observer], screen: Screen) -> Iterator[tuple[Array, Array | None]]:
-        """By quadrature over each pixel."""
+        """By quadrature over each pixel, with the standard error of the field there, beside which that of the quadrature is
+        nothing."""  # noqa: D205, D209 - one sentence
         for observer in observers:
             samples = self._samples or lines_per_pixel(screen)
-            yield look_at_field(self._field, observer, screen, samples, self._threads).values, None
+            seen = look_at_field(self._field, observer, screen, samples, self._threads)
+            yield seen.values, seen.standard_error
 
 
 class SceneLamp(Lamp):
@@ -245,13 +252,18 @@ class FunctionLamp(Lamp):
         return far, far
 
     def images(self, observers: Sequence[Observer], screen: Screen) -> Iterator[tuple[Array, Array | None]]:
-        """By lines at random places in each cell of a lattice in each pixel."""
+        """By lines at random places in each cell of a lattice in each pixel, with errors by what neighbouring cells differ.
+
+        That is the spread within both cells, and what their means differ on top of it: no less than the error where a lamp
+        has edges, and up to twice as much.
+        """
         n = math.ceil(math.sqrt(self._samples or lines_per_pixel(screen)))
         width, height = screen.width / screen.columns, screen.height / screen.rows
         for number, observer in enumerate(observers):
             rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((self._seed, 2, number))))
             right, up, _ = screen.axes(observer)
-            total = np.zeros(screen.shape)
+            total, variance = np.zeros(screen.shape), np.zeros(screen.shape)
+            last = total
             for i in range(n):
                 for j in range(n):
                     x = screen.x[None, :] + width * ((i + rng.random(screen.shape)) / n - 0.5)
@@ -259,9 +271,14 @@ class FunctionLamp(Lamp):
                     points = np.asarray(observer.target) + x[..., None] * right + y[..., None] * up
                     towards = observer.position - points
                     towards /= np.linalg.norm(towards, axis=-1, keepdims=True)
-                    seen = self._luminance(points.reshape(-1, 3), towards.reshape(-1, 3))
-                    total += np.asarray(seen, dtype=np.float64).reshape(screen.shape)
-            yield total / n**2, None
+                    told = self._luminance(points.reshape(-1, 3), towards.reshape(-1, 3))
+                    seen = np.asarray(told, dtype=np.float64).reshape(screen.shape)
+                    total += seen
+                    # Cells two by two; of an odd number the last with the one before, for itself alone.
+                    if j % 2 or (j and j == n - 1):
+                        variance += (seen - last) ** 2 * (1.0 if j % 2 else 0.5)
+                    last = seen
+            yield total / n**2, np.sqrt(variance) / n**2 if n > 1 else None
 
 
 def lines_per_pixel(screen: Screen) -> int:
