@@ -37,9 +37,6 @@ SHOWN = 0.995
 MARGIN = 1.1
 """How much larger than that the screen is."""
 
-FEW_STARTS = 256
-"""Rays drawn from a field to tell where its light starts."""
-
 POINTS = 48
 """Points along each coordinate of a part over which the intensity of a field towards an observer is summed."""
 
@@ -213,9 +210,10 @@ def shows_whole(field: LightField, lmap: LuminanceMap) -> bool:
 
 
 def is_far(field: LightField, lmap: LuminanceMap) -> bool:
-    """Whether the observer is farther from his target than the light of the field starts."""
-    away = np.linalg.norm(field.sample(FEW_STARTS).position - np.asarray(lmap.observer.target), axis=1)
-    return bool(away.max() < lmap.observer.distance)
+    """Whether the observer is for sure farther from his target than any part of the field's surface."""
+    target = np.asarray(lmap.observer.target)
+    reach = [np.linalg.norm(np.asarray(p.centre) - target) + np.linalg.norm(p.size) for p in field.surface.parts()]
+    return bool(max(reach) < lmap.observer.distance)
 
 
 def centre_of_light(rays: RaySet) -> tuple[float, float, float]:
@@ -268,8 +266,8 @@ def beyond_notes(rays: RaySet, observer: Observer, screen: Screen) -> tuple[str,
     if not share > MOST_BEYOND:
         return ()
     told = (
-        f"about {share:.0%} of the light that the map shows starts beyond the observer and is seen along the lines of its rays, "
-        "as if it came through the screen: right if they were recorded on a surface about their source, wrong of a lamp "
+        f"about {share:.0%} of the light that the map shows starts beyond the observer and is seen along the lines of its "
+        "rays, as if it came through the screen: right if they were recorded on a surface about their source, wrong of a lamp "
         "that is behind him; leave that one out, or put both into a scene"
     )
     return (told,)
