@@ -61,7 +61,7 @@ def test_an_axis_that_there_is_none_is_refused_with_those_that_there_are() -> No
 
 
 def test_text_is_no_length() -> None:
-    with pytest.raises(ValueError, match="could not convert"):
+    with pytest.raises(ValueError, match="Disk: radius is 'wide'"):
         et.Disk(radius="wide")  # type: ignore[arg-type]
 
 
