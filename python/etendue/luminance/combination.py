@@ -10,6 +10,18 @@ import numpy as np
 from etendue.errors import ArgumentError
 from etendue.quantities.arguments import require
 from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map, dead_note
+from etendue.quantities.provenance import Provenance
+
+
+LOOKING = ("luminance by", "light field on")
+"""How the steps of a provenance begin that tell how rays were looked at, and no longer which, unless they draw some by a seed
+of their own."""
+
+
+def _rays_of(provenance: Provenance) -> Provenance:
+    """What a map was made of: all steps before the rays were looked at."""
+    looked = (number for number, step in enumerate(provenance.steps) if step.startswith(LOOKING) and "seed" not in step)
+    return dataclasses.replace(provenance, steps=provenance.steps[: next(looked, None)])
 
 
 def combine_maps(maps: Sequence[LuminanceMap]) -> LuminanceMap:
@@ -27,7 +39,8 @@ def combine_maps(maps: Sequence[LuminanceMap]) -> LuminanceMap:
     Raises
     ------
     ArgumentError
-        If there is no map, one is none of luminance, they differ in observer, screen or unit, or two have the same origin.
+        If there is no map, one is none of luminance, they differ in observer, screen or unit, or two are of the same rays:
+        their origin and all that was done to the rays is the same, whatever they were looked at by.
 
     Examples
     --------
@@ -51,12 +64,16 @@ def combine_maps(maps: Sequence[LuminanceMap]) -> LuminanceMap:
                     f"combine_maps: {name} differs: {getattr(first, name)} and {getattr(other, name)}. "
                     "Only maps of the same view can be combined."
                 )
-    for index, lmap in enumerate(maps):
-        if lmap.provenance.format != "memory" and lmap.provenance in [m.provenance for m in maps[:index]]:
+    earlier: dict[Provenance, int] = {}
+    for number, lmap in enumerate(maps, start=1):
+        origin = _rays_of(lmap.provenance)
+        if lmap.provenance.format != "memory" and origin in earlier:
             raise ArgumentError(
-                f"combine_maps: map {index + 1} has the same origin as an earlier one ({lmap.provenance.source}: "
-                f"{'; '.join(lmap.provenance.steps)}). Only independent maps can be combined."
+                f"combine_maps: maps {earlier[origin]} and {number} are of the same rays ({origin.source}"
+                f"{''.join(f'; {step}' for step in origin.steps)}): their errors are not independent. Give maps of other "
+                "seeds, files, or parts of `RaySet.thin`."
             )
+        earlier[origin] = number
     n = len(maps)
     missing = [np.isnan(m.values) for m in maps]
     dead = np.all(missing, axis=0)
