@@ -21,7 +21,6 @@ from etendue.lightfield.light_field import LightField
 from etendue.lightfield.resolution import Resolution
 from etendue.lightfield.trees import Base
 from etendue.quantities.measured import measured
-from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_stream import RayStream, checked_threads
 from etendue.units import LUMINANCE_UNIT, MM2_PER_M2, FluxUnit
 
@@ -114,7 +113,7 @@ class Diagnostics:
             f"{report.effective_cells:,.0f} effective degrees of freedom",
             f"relative error at a ray by the error bars {self.expected_error:.1%}",
             f"half of the flux in {half:.4g} mm² sr, 99 % in {most:.4g} of {curve.total_etendue:.4g} mm² sr",
-            f"peak {counted(curve.luminance[0], unit)}",
+            f"brightest lines {measured(curve.luminance[0], curve.standard_error[0], unit)}: picked out, and lifted by chance",
             f"resolves {self.resolution.summary()}",
         ]
         if self.forecast is not None:

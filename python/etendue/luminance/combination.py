@@ -12,10 +12,9 @@ from etendue.quantities.arguments import require
 from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map, dead_note
 from etendue.quantities.provenance import Provenance
 
-
 LOOKING = ("luminance by", "light field on")
-"""How the steps of a provenance begin that tell how rays were looked at, and no longer which, unless they draw some by a seed
-of their own."""
+"""How the steps of a provenance begin that tell how rays were looked at, and no longer which, unless they draw some by a
+seed of their own."""
 
 
 def _rays_of(provenance: Provenance) -> Provenance:

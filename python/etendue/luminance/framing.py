@@ -267,8 +267,8 @@ def beyond_notes(rays: RaySet, observer: Observer, screen: Screen) -> tuple[str,
         return ()
     told = (
         f"about {share:.0%} of the light that the map shows starts beyond the observer and is seen along the lines of its "
-        "rays, as if it came through the screen: right if they were recorded on a surface about their source, wrong of a lamp "
-        "that is behind him; leave that one out, or put both into a scene"
+        "rays, as if it came through the screen: right if they were recorded on a surface about their source, wrong of a "
+        "lamp that is behind him; leave that one out, or put both into a scene"
     )
     return (told,)
 
