@@ -113,7 +113,7 @@ class Diagnostics:
             f"{report.effective_cells:,.0f} effective degrees of freedom",
             f"relative error at a ray by the error bars {self.expected_error:.1%}",
             f"half of the flux in {half:.4g} mm² sr, 99 % in {most:.4g} of {curve.total_etendue:.4g} mm² sr",
-            f"brightest lines {measured(curve.luminance[0], curve.standard_error[0], unit)}: picked out, and lifted by chance",
+            f"brightest lines {measured(curve.luminance[0], curve.standard_error[0], unit)}: picked out, lifted by chance",
             f"resolves {self.resolution.summary()}",
         ]
         if self.forecast is not None:
