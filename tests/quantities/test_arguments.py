@@ -62,6 +62,9 @@ CALLS: dict[str, tuple[Callable[[Any], object], tuple[Any, ...]]] = {
     "plot_animation": (lambda wrong: et.plot_animation(wrong, "a.gif"), (LMAP, None, ["a.npz", "b.npz"])),
     "deconvolve: scan": (lambda wrong: et.deconvolve(wrong, wrong), ("scan.csv", None, LMAP)),
     "deconvolve_directions: scan": (et.deconvolve_directions, ("scan.csv", None, LMAP)),
+    "plot: path": (lambda wrong: et.plot_map(LMAP, wrong), (3, ["a.png"])),
+    "LightField.fit: rays": (et.LightField.fit, ("lamp.tm25ray", None, LMAP)),
+    "parse_surface: text": (et.parse_surface, (None, 3, et.Disk(radius=3))),
     "path is": (et.read_rays, (None, 3.5, [])),
 }
 """By what the message begins with or names: a call, and what it refuses."""

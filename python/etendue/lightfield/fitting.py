@@ -37,6 +37,7 @@ from etendue.lightfield.selection.search import choose_surface
 from etendue.lightfield.surfaces import Plane, Surface
 from etendue.lightfield.symmetry import fold, order, proven_symmetry, refutation
 from etendue.lightfield.trees import POSITIONS, holding_memory
+from etendue.quantities.arguments import require
 from etendue.quantities.distinct_rays import DistinctRays
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, checked_seed, checked_threads
@@ -118,6 +119,7 @@ def fit_light_field(
 ) -> EtendueDensity:
     """See `LightField.fit`."""
     threads, seed = checked_threads(threads), checked_seed(seed)
+    require(rays, RayStream, "LightField.fit: rays", "rays, of a file et.read_rays(path)")
     if max_resolution is not None and not 0.0 < max_resolution < math.inf:
         raise ArgumentError(f"max_resolution is {max_resolution}; give the side of the finest cells, a length in mm.")
     check_near_field(rays)

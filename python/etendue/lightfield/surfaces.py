@@ -14,7 +14,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.lightfield.pilot_sample import pilot_sample
-from etendue.quantities.arguments import require_number
+from etendue.quantities.arguments import require, require_number
 from etendue.quantities.ray_stream import RayStream
 
 FloatArray = npt.NDArray[np.float64]
@@ -654,6 +654,7 @@ def parse_surface(text: str) -> Surface:
     >>> parse_surface("cylinder:radius=2,bottom=0,top=5,ends=false")
     Cylinder(radius=2.0, bottom=0.0, top=5.0, centre=(0.0, 0.0), ends=False, axis='z')
     """
+    require(text, str, "parse_surface: text", "a surface in words, e.g. 'disk:radius=3'")
     name, _, rest = text.partition(":")
     kind = SURFACES.get(name.strip())
     if kind is None:
