@@ -203,7 +203,9 @@ def deconvolve(
     if stop is not None and method not in {None, "richardson-lucy"}:
         raise ArgumentError(f"a stop is for method='richardson-lucy'; {method!r} does not iterate")
     for name, given in (("scan", scan), ("signature", signature)):
-        require(given, GoniometerScan, f"deconvolve: {name}", "a GoniometerScan: of a file et.read_goniometer_scan(path)")
+        require(
+            given, GoniometerScan, f"deconvolve: {name}", "a GoniometerScan: of a file et.read_goniometer_scan(path)"
+        )
     notes = list(scan.notes)
     if scan.angle.size < 5:
         raise ArgumentError(f"a scan of {scan.angle.size} positions; five are needed at least")
