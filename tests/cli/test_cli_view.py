@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+import re
 from pathlib import Path
 
+import etendue as et
 import pytest
 from viewer.viewables import make_files
 
@@ -26,6 +29,25 @@ def test_the_verb_writes_a_page_and_says_how_exact_it_is(run: Run, files: Path) 
     outcome = run("view", files / "map.exr", "-o", "map.html")
     assert outcome.out.startswith("map.html: ")
     assert "single precision" in outcome.out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("file", "options", "flux"),
+    [("rings.tm25ray", ["--flux", "300"], 300.0), ("trace.h5", ["--detector", "disk"], 100.0)],
+)
+def test_the_command_of_the_page_has_the_options_of_the_page(
+    run: Run, files: Path, file: str, options: list[str], flux: float
+) -> None:
+    """The map that the command makes is one of the light that the page shows: as much flux, of the same detector."""
+    assert run("view", files / file, "-o", "a.html", *options).status == 0
+    page = (files / "a.html").read_text("utf-8")
+    spelled = re.search(r'"options":"([^"]*) "', page)[1].split(" ")  # type: ignore[index]
+    assert spelled == ["--method", "lightfield", *options]
+    view = ["--observer=0,0", "--distance", 1000, "--size", "80,80", "--pixels", "8,8", "--json"]
+    assert run("luminance", files / file, *spelled, *view, "-o", "map.npz").status == 0
+    # Lambertian sources seen along their axis: π I is the flux, of few rays.
+    assert et.read_map(files / "map.npz").intensity * math.pi == pytest.approx(flux, rel=0.1)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import shlex
 import webbrowser
 from pathlib import Path
 from typing import Annotated, Any
@@ -80,6 +81,7 @@ def view(
             viewable,
             name=title or file.name,
             file=str(file),
+            options=_spelled({"--detector": detector, "--flux": flux, "--unit": unit}),
             rays=rays,
             seed=seed,
             cache=cache,
@@ -115,6 +117,11 @@ def view(
             webbrowser.open(server.url)
         with contextlib.suppress(KeyboardInterrupt):
             server.serve_forever()
+
+
+def _spelled(options: dict[str, str | None]) -> str:
+    """The options that are stated, as a shell takes them."""
+    return shlex.join(word for name, value in options.items() if value is not None for word in (name, value))
 
 
 def _opened(file: Path, detector: str | None) -> Viewable:

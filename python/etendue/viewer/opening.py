@@ -129,6 +129,7 @@ def exhibit_of(
     *,
     name: str,
     file: str | None = None,
+    options: str = "",
     detector: str | None = None,
     rays: float | None = None,
     seed: int = 1,
@@ -146,6 +147,8 @@ def exhibit_of(
         Title of the page.
     file : str, optional
         As commands name it; the name if not given.
+    options : str
+        With which the file was opened, as commands spell them: the page's command has them, too.
     detector : str, optional
         Of the result of a trace.
     rays : float, optional
@@ -175,20 +178,20 @@ def exhibit_of(
         viewable = of_detector(viewable, detector)
     elif detector is not None:
         raise ArgumentError(f"detector {detector!r}: for results of traces; this is none.")
-    file = file or name
+    file, options = file or name, f"{options} " if options else ""
     if isinstance(viewable, PixelMap):
         return Exhibit(map_subject(viewable, name, file), viewable)
     if isinstance(viewable, LightField):
-        return Exhibit(field_subject(viewable, name, file), viewable)
+        return Exhibit(field_subject(viewable, name, file, options), viewable)
     if isinstance(viewable, Scene):
         whole = rays or SCENE_RAYS
         light = light_of(viewable, whole, seed, threads, _part_of(progress, 0.0, TRACED, whole))
         fitting = _part_of(progress, TRACED * whole, (1.0 - TRACED) * whole / len(light), whole)
         field = fit_or_recall(light, cache=cache, threads=threads, progress=fitting)
-        return Exhibit({**field_subject(field, name, file), **_scene_subject(viewable, seed)}, field, viewable)
+        return Exhibit({**field_subject(field, name, file, options), **_scene_subject(viewable, seed)}, field, viewable)
     field = fit_or_recall(viewable, cache=cache, threads=threads, progress=progress)
     # Of rays that are indexed, maps are made by the cone if nothing is said.
-    return Exhibit(field_subject(field, name, file, "--method lightfield "), field)
+    return Exhibit(field_subject(field, name, file, f"--method lightfield {options}"), field)
 
 
 def _part_of(progress: Progress | None, before: float, each: float, whole: float) -> Progress | None:
