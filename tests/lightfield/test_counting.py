@@ -102,6 +102,7 @@ def test_what_cannot_be_counted_is_refused() -> None:
         assert count_rays(broken, et.Disk(radius=1), PartGrids((1, 1, 1, 1))).rays == 1
 
 
+@pytest.mark.slow
 def test_rays_without_flux_change_nothing() -> None:
     """As many dark rays behind the others: the same field with the same errors, and the same number of rays."""
     lit = rays_of(6000)

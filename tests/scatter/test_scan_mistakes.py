@@ -81,6 +81,7 @@ def test_slices_that_cannot_be() -> None:
         dataclasses.replace(one, points=to * np.array([[1, 1, 1], [1, 1, -1]]))
 
 
+@pytest.mark.slow
 def test_a_scan_that_states_another_solid_angle_than_its_instrument_has() -> None:
     """The same values either way, and a note with both."""
     goniometer = et.ScatterGoniometer(photons=1e8)
