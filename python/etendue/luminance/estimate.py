@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, TypedDict, Unpack, cast, overload
 
+from etendue.quantities.arguments import require_callable
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.lightfield.light_field import LightField
@@ -197,6 +198,7 @@ def luminance_map(
     """
     if isinstance(source, str | os.PathLike):
         source = open_source(source)
+    require_callable(progress)
     options = {
         "acceptance": acceptance,
         "observer_radius": observer_radius,

@@ -52,9 +52,9 @@ class Region:
         for field in dataclasses.fields(self):
             require_number(getattr(self, field.name), f"Region: {field.name}", "a limit in mm")
         if not all(map(math.isfinite, dataclasses.astuple(self))):
-            raise ArgumentError(f"{self._told}: give four finite limits in mm.")
+            raise ArgumentError(f"{self}: give four finite limits in mm.")
         if not (self.left < self.right and self.bottom < self.top):
-            raise ArgumentError(f"{self._told}: left must be below right and bottom below top (x right, y up, in mm).")
+            raise ArgumentError(f"{self}: left must be below right and bottom below top (x right, y up, in mm).")
 
     @property
     def corners(self) -> tuple[tuple[float, float], ...]:
@@ -62,9 +62,8 @@ class Region:
         left, right, bottom, top = self.left, self.right, self.bottom, self.top
         return (left, bottom), (right, bottom), (right, top), (left, top)
 
-    @property
-    def _told(self) -> str:
-        """The region as the command line takes it."""
+    def __str__(self) -> str:
+        """As the command line takes it."""
         return f"region {self.left:g},{self.right:g},{self.bottom:g},{self.top:g}"
 
     def mask(self, screen: Screen) -> Mask:
@@ -81,7 +80,7 @@ class Region:
         rows = (screen.y >= self.bottom - slack_y) & (screen.y <= self.top + slack_y)
         if not (columns.any() and rows.any()):
             raise ArgumentError(
-                f"{self._told}: no pixel centre lies in it. The screen spans x = ±{screen.width / 2:g} mm and "
+                f"{self}: no pixel centre lies in it. The screen spans x = ±{screen.width / 2:g} mm and "
                 f"y = ±{screen.height / 2:g} mm in {screen.columns} × {screen.rows} pixels."
             )
         return np.logical_and.outer(rows, columns)
@@ -127,6 +126,10 @@ class PolygonRegion:
         if not max(off) > ON_THE_EDGE * width * width:
             raise ArgumentError(f"region {_told(corners)}: the corners lie on one line and span no area.")
 
+    def __str__(self) -> str:
+        """As the command line takes it."""
+        return f"region {_told(self.corners)}"
+
     @property
     def area(self) -> float:
         """Of a polygon that does not cross itself [mm²], by the shoelace formula: loops of either sense cancel."""
@@ -159,7 +162,7 @@ class PolygonRegion:
         inside |= on_edge
         if not inside.any():
             raise ArgumentError(
-                f"region {_told(self.corners)}: no pixel centre lies in it. The screen spans ±{screen.width / 2:g} mm "
+                f"{self}: no pixel centre lies in it. The screen spans ±{screen.width / 2:g} mm "
                 f"across and ±{screen.height / 2:g} mm up in {screen.columns} × {screen.rows} pixels."
             )
         return inside

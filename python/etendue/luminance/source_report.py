@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+from etendue.quantities.arguments import require
 from etendue.errors import ArgumentError
 from etendue.formats.rays import read_rays
 from etendue.formats.rays.facts import fact_rows, ray_facts
@@ -190,6 +191,10 @@ def report_source(
     """
     rays = source if isinstance(source, RaySet) else read_rays(source)
     name = rays.provenance.source if isinstance(source, RaySet) else str(source)
+    if observers is not None:
+        require(observers, Sequence, "report_source: observers", "et.Observer(theta, phi, distance) in a sequence, or None")
+        for one in observers:
+            require(one, Observer, "report_source: one of the observers", "an et.Observer(theta, phi, distance)")
     if observers is not None and not observers:
         raise ArgumentError("report_source: the sequence of observers is empty; give at least one.")
     facts = fact_rows(ray_facts(rays, name))
