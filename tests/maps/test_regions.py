@@ -135,6 +135,19 @@ def test_the_error_of_a_mean_is_its_spread() -> None:
     assert np.std(means, ddof=1) == pytest.approx(stated, rel=4 / math.sqrt(2 * 499))
 
 
+def test_chance_lifts_the_largest_pixel_and_not_the_maximum_apart() -> None:
+    """100 maps of 1 600 even pixels, each with its own error: the largest is 3.2 of them too large on average, what is
+    stated of pixels that err apart less than half of one. One pixel that stands out keeps its value."""
+    draws = np.random.default_rng(5).normal(10.0, 0.5, (100, 40, 40))
+    found = [region_statistics(make_map(one), Region(-20, 20, -20, 20)) for one in draws]
+    assert np.mean([one.maximum for one in found]) - 10.0 > 3.0 * 0.5
+    assert abs(np.mean([one.maximum_apart for one in found]) - 10.0) < 0.5 * 0.5
+    draws[:, 3, 7] = 20.0
+    assert region_statistics(make_map(draws[0]), Region(-20, 20, -20, 20)).maximum_apart == pytest.approx(
+        20.0, abs=1e-6
+    )
+
+
 def test_regions_are_outlined_and_numbered() -> None:
     regions = [Region(-1, 1, -1, 0), PolygonRegion([(-2, -1), (2, -1), (0, 1)])]
     figure = plot_map(make_map([[1, 2, 3, 4], [5, 6, 7, 8]]), regions=regions)

@@ -13,7 +13,7 @@ from etendue.cli.terminal import say
 from etendue.formats.maps import PICTURE_EXTENSIONS
 from etendue.formats.maps.map_format import AnyMap
 from etendue.luminance.filters import pixels_err_together
-from etendue.luminance.region_statistics import region_statistics
+from etendue.luminance.region_statistics import RegionStatistics, region_statistics
 from etendue.luminance.regions import AnyRegion, parse_region
 from etendue.plot.colour_scale import Scale
 from etendue.plot.map_picture import plot_map
@@ -23,6 +23,10 @@ from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.measured import measured
 from etendue.quantities.observer import Screen
 from etendue.quantities.powers_of_ten import counted
+from etendue.quantities.unlifted import Unlifted, unlifted
+
+LIFT = 0.01
+"""Share of a maximum that chance may lift it by without a word."""
 
 
 def parsed_regions(texts: Sequence[str] | None, outputs: Iterable[Path]) -> list[AnyRegion]:
@@ -76,6 +80,7 @@ def summary(lmap: LuminanceMap, regions: Sequence[AnyRegion] = ()) -> dict[str, 
         "screen": lmap.header()["screen"],
         "mean_of_live_pixels": float(values.mean()) if live.any() else None,
         "maximum": float(values.max()) if live.any() else None,
+        "maximum_apart": _apart(lmap).value if live.any() else None,
         "intensity": lmap.intensity,
         "relative_error": None if error is None else dataclasses.asdict(error),
         "rays": int(lmap.rays[lmap.rays > 0].sum()) if (lmap.rays >= 0).any() else None,
@@ -92,11 +97,8 @@ def print_map(lmap: LuminanceMap, regions: Sequence[AnyRegion] = (), *, notes: b
     where = lmap.observer
     say(f"{facts['quantity']} from θ = {where.theta:g}°, φ = {where.phi:g}°, {where.distance:g} mm")
     if facts["maximum"] is not None:
-        error = lmap.standard_error.flat[np.nanargmax(lmap.values)]
-        say(
-            f"  mean of live pixels {counted(facts['mean_of_live_pixels'], lmap.unit)}, "
-            f"maximum {measured(facts['maximum'], error, lmap.unit)}"
-        )
+        dead = f" ({facts['dead_pixels']:,} dead ones left out)" if facts["dead_pixels"] else ""
+        say(f"  mean of live pixels {counted(facts['mean_of_live_pixels'], lmap.unit)}{dead}, maximum {_maximum(lmap)}")
         unit = "cd" if lmap.flux_unit == "lm" else "W/sr"
         say(f"  intensity towards the observer {counted(facts['intensity'], unit)}")
     if lmap.relative_error is not None:
@@ -106,6 +108,33 @@ def print_map(lmap: LuminanceMap, regions: Sequence[AnyRegion] = (), *, notes: b
         say(f"  {note}")
 
 
+def _lifted(found: RegionStatistics, together: bool) -> str:
+    """What a maximum is without the lift of chance, if pixels err by themselves and it is a hundredth or more."""
+    if together or not found.maximum - found.maximum_apart > LIFT * found.maximum:
+        return ""
+    # What is below half of it is made of single rays.
+    if found.maximum_apart < 0.5 * found.maximum:
+        return " (chance alone may have made it)"
+    return f" (lifted by chance from {counted(found.maximum_apart, found.unit)})"
+
+
+def _apart(lmap: LuminanceMap) -> Unlifted:
+    """The largest pixel less what chance lifts it by if each pixel errs by itself."""
+    live = ~np.isnan(lmap.values)
+    return unlifted(lmap.values[live], lmap.standard_error[live], np.ones(int(live.sum())))
+
+
+def _maximum(lmap: LuminanceMap) -> str:
+    """The largest luminance with its error, and the largest pixel if chance lifts that by more than half of its error."""
+    largest, error = float(np.nanmax(lmap.values)), float(lmap.standard_error.flat[np.nanargmax(lmap.values)])
+    apart = largest if pixels_err_together(lmap) else _apart(lmap).value
+    if not largest - apart > 0.5 * error:
+        return measured(largest, error, lmap.unit)
+    if apart < error:
+        return f"not known (chance alone may have made the largest pixel, {counted(largest, lmap.unit)})"
+    return f"{measured(apart, error, lmap.unit)} (largest pixel {counted(largest, lmap.unit)}, lifted by chance)"
+
+
 def _print_regions(lmap: AnyMap, regions: Sequence[AnyRegion]) -> None:
     for number, region in enumerate(regions, 1):
         found = region_statistics(lmap, region)
@@ -113,7 +142,8 @@ def _print_regions(lmap: AnyMap, regions: Sequence[AnyRegion]) -> None:
         mean_error = found.mean_error if together else found.mean_error_apart
         say(
             f"  region {number}: mean {measured(found.mean, mean_error, found.unit)}, "
-            f"minimum {counted(found.minimum, found.unit)}, maximum {counted(found.maximum, found.unit)}, "
+            f"minimum {counted(found.minimum, found.unit)}, maximum {counted(found.maximum, found.unit)}"
+            f"{_lifted(found, together)}, "
             f"minimum over mean {found.uniformity:.3g}"
             + "".join(f"; {note}" for note in found.notes)
             + (f"; {found.dead_pixels} of {found.pixels} pixels are dead and count as 0" if found.dead_pixels else "")

@@ -16,6 +16,7 @@ from etendue.quantities.arguments import LUMINANCE_OR_ILLUMINANCE, require, requ
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Screen
+from etendue.quantities.unlifted import unlifted
 
 PERCENTILES = (5.0, 50.0, 95.0)
 """That are stated [%]."""
@@ -35,6 +36,9 @@ class RegionStatistics:
         illuminance that no ray reached count as 0 ± 0.
     mean_error_apart : float
         The same if each pixel errs by itself, as those do that count rays: the root of the sum of squares over their number.
+    maximum_apart : float
+        The maximum less what chance lifts the largest of many pixels by, if each errs by itself
+        (`etendue.quantities.unlifted`), in `unit`. The minimum is lowered by chance likewise.
     percentiles : tuple of pairs
         Share [%] and value: the linear interpolation between ranked pixels.
     uniformity : float
@@ -64,6 +68,7 @@ class RegionStatistics:
     mean_error_apart: float
     minimum: float
     maximum: float
+    maximum_apart: float
     percentiles: tuple[tuple[float, float], ...]
     uniformity: float
     uniformity_of_extremes: float
@@ -146,6 +151,7 @@ def region_statistics(
         mean_error_apart=float(np.sqrt((errors**2).sum()) / errors.size),
         minimum=low,
         maximum=high,
+        maximum_apart=unlifted(values, np.nan_to_num(errors), np.ones(values.size)).value,
         percentiles=tuple((float(share), float(np.percentile(values, share))) for share in percentiles),
         uniformity=low / mean if mean > 0.0 else math.nan,
         uniformity_of_extremes=low / high if high > 0.0 else math.nan,
