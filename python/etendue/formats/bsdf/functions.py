@@ -102,7 +102,7 @@ def sampled(
         incident = light_from(theta, phi)
 
         def known(to: Array, incident: Array = incident) -> Array:
-            return np.maximum(evaluate(np.broadcast_to(incident, to.shape), to), 0.0)
+            return evaluate(np.broadcast_to(incident, to.shape), to)
 
         values = _filled(grid, incident, known, transmitted=transmitted, beyond=np.nan)
         found.append(BsdfSlice(incident, values, transmitted, grid=grid, wavelength=wavelength))

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
+from etendue.formats.bsdf.points import below_zero
 from etendue.formats.bsdf.window_xml import DAMAGED, WAYS, azimuth_of, block_of, document, read_window
 from etendue.formats.rays.text_rows import number
 from etendue.formats.xml_tree import Element
@@ -85,7 +86,7 @@ def recognise(head: bytes) -> bool:
 
 
 def read(path: Path) -> BsdfData:
-    """Read the visible values, of both sides and ways that are there; negative ones become 0."""
+    """Read the visible values, of both sides and ways that are there."""
     window = read_window(path)
     if window.structure not in ("Columns", "Rows"):
         found = f"IncidentDataStructure is {window.structure[:40]!r}"
@@ -143,9 +144,8 @@ def _slices(
         raise FormatError(path, data.place, str(error), DAMAGED) from None
     if not np.isfinite(values).all():
         raise FormatError(path, data.place, "a value is not finite", DAMAGED)
-    if (count := int((values < 0.0).sum())) > 0:
-        complaints.append(Complaint("note", data.place, f"{count} values below 0 became 0"))
-    matrix = np.maximum(values, 0.0).reshape(
+    complaints += below_zero(values, data.place)
+    matrix = values.reshape(
         (outgoing.size, incident.size) if structure == "Columns" else (incident.size, outgoing.size)
     )
     if structure == "Rows":

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
+from etendue.formats.bsdf.points import below_zero
 from etendue.formats.bsdf.shares import disagreements
 from etendue.formats.bsdf.tokens import Tokens
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
@@ -49,6 +50,7 @@ def read(path: Path) -> BsdfData:
     grid, order = _grid(tokens, radial, azimuth, header.get("Symmetry", ""))
     slices: list[BsdfSlice] = []
     complaints: list[Complaint] = []
+    read_values: list[Array] = []
     block: dict[str, Any] = {}
     while True:
         key = tokens.choice(
@@ -69,10 +71,8 @@ def read(path: Path) -> BsdfData:
             stated = tokens.number("TIS")
             values = tokens.numbers("values", azimuth.size * radial.size).reshape(azimuth.size, radial.size)
             if block.get("TristimulusValue", "TrisY") == "TrisY":
-                slices.append(_slice(tokens, block, np.maximum(values, 0.0)[order], grid, stated, complaints))
-            if values.min() < 0.0:
-                place = f"{block.get('AOI', 0.0):g}° of incidence"
-                complaints.append(Complaint("warning", place, f"{(values < 0.0).sum()} values below 0 became 0"))
+                slices.append(_slice(tokens, block, values[order], grid, stated, complaints))
+                read_values.append(values)
             block = {}
     if not slices:
         tokens.refuse("no block of data")
@@ -87,7 +87,7 @@ def read(path: Path) -> BsdfData:
         mirrored=False,
         both_sides=not both,
         name=path.stem,
-        complaints=(*complaints, *disagreements(slices)),
+        complaints=(*complaints, *below_zero(np.array(read_values)), *disagreements(slices)),
     )
 
 

@@ -101,8 +101,10 @@ def slices_of(
     return found
 
 
-def below_zero(values: Array) -> list[Complaint]:
-    """What is to be told of values below 0, if there are any.
+def below_zero(values: Array, place: str = "values") -> list[Complaint]:
+    """What is to be told of values below 0, if there are any; NaN where nothing was measured.
+
+    Every reader keeps them: taken for 0 they would leave the mean of the noise of a dark sample, more light than there is.
 
     Examples
     --------
@@ -112,8 +114,8 @@ def below_zero(values: Array) -> list[Complaint]:
     count = int((values < 0.0).sum())
     if not count:
         return []
-    found = f"{count} of {values.size} below 0, down to {values.min():.3g}, as noise about a dark level may be"
-    return [Complaint("note", "values", f"{found}; they count in the share of the light")]
+    found = f"{count} of {values.size} below 0, down to {np.nanmin(values):.3g}, as noise about a dark level may be"
+    return [Complaint("note", place, f"{found}; they count in the share of the light")]
 
 
 SEVERAL = "directions that stand there several times, as for two polarisations, became their mean"

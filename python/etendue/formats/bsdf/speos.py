@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
+from etendue.formats.bsdf.points import below_zero
 from etendue.formats.bsdf.shares import scaled
 from etendue.formats.bsdf.tokens import ADVICE, Tokens
 from etendue.formats.encodings import decoded
@@ -76,6 +77,7 @@ def read(path: Path) -> BsdfData:
             for turn, thetas in incidences.items()
             for theta in thetas
         ]
+        complaints += below_zero(np.concatenate([one.values.ravel() for one in own]), WAYS[transmitted])
         slices += _scaled(tokens, own, spectrum, complaints)
     if " ".join(tokens.words[tokens.at : tokens.at + 3]).casefold() != "end of file":
         tokens.refuse("the data do not end with 'End of file'")
@@ -154,7 +156,7 @@ def slice_of(tokens: Tokens, theta: float, turn: float, transmitted: bool, *, in
         with np.errstate(divide="ignore", invalid="ignore"):
             values = np.where(cosine > 1e-6, values / cosine, np.nan)
     grid = PolarGrid("normal", polar, phi + turn)
-    return BsdfSlice(light_from(theta, (180.0 + turn) % 360.0), np.maximum(values, 0.0).T, transmitted, grid=grid)
+    return BsdfSlice(light_from(theta, (180.0 + turn) % 360.0), values.T, transmitted, grid=grid)
 
 
 def _scaled(
@@ -179,7 +181,7 @@ def _scaled(
             complaints.append(Complaint("note", f"{theta:g}° of incidence", text))
     if not known > 0.0:
         if wanted > 0.0:
-            tokens.refuse("nothing is scattered at the reference incidence, though its spectrum says so")
+            tokens.refuse("values at the reference incidence add up to no light, though its spectrum says so")
         known = 1.0
     else:
         way = WAYS[near[0].transmitted]
@@ -241,7 +243,7 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
     for transmitted in ways:
         turn, own = next(iter(ordered[transmitted].items()))
         lines += [f"{own[0].theta:.12g}\t{turn:.9g}", "", "2"]
-        lines += [f"{wavelength}\t{100.0 * own[0].integral():.12g}" for wavelength in (350, 850)]
+        lines += [f"{wavelength}\t{100.0 * max(own[0].integral(), 0.0):.12g}" for wavelength in (350, 850)]
     for transmitted in ways:
         for one in (one for own in ordered[transmitted].values() for one in own):
             lines += table_rows(one)

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from etendue.errors import UnsupportedFormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
+from etendue.formats.bsdf.points import below_zero
 from etendue.formats.bsdf.shares import scaled
 from etendue.formats.bsdf.speos import PHI_STEP, THETA, WAYS, flag, past_header, slice_of, table_rows
 from etendue.formats.bsdf.tokens import Tokens
@@ -60,15 +61,17 @@ def read(path: Path) -> BsdfData:
         tokens.refuse("wavelengths do not rise")
     slices = []
     tables: list[tuple[str, float, float]] = []
+    read_values: list[Array] = []
     for transmitted in (way for way in (False, True) if there[way]):
         for theta, wave in itertools.product(incidences, waves):
             share = tokens.number("share [%]")
             if not 0.0 <= share <= 100.0:
                 tokens.refuse(f"a share of {share:g} %")
             one = slice_of(tokens, min(float(theta), 89.99), 0.0, transmitted, intensity=kind == 0.0)
+            read_values.append(one.values.ravel())
             known = one.integral()
             if share > 0.0 and not known > 0.0:
-                tokens.refuse("nothing is scattered, though the share says so")
+                tokens.refuse("values add up to no light, though the share says so")
             stated = 0.01 * share
             factor = stated / known if known > 0.0 else 0.0
             if known > 0.0:
@@ -77,7 +80,7 @@ def read(path: Path) -> BsdfData:
             slices.append(dataclasses.replace(one, values=one.values * factor, wavelength=wavelength, stated=stated))
     if " ".join(tokens.words[tokens.at : tokens.at + 3]).casefold() != "end of file":
         tokens.refuse("the data do not end with 'End of file'")
-    complaints = tuple(scaled(tables))
+    complaints = (*below_zero(np.concatenate(read_values)), *scaled(tables))
     return BsdfData(tuple(_of_one_colour(slices)), mirrored=False, name=path.stem, complaints=complaints)
 
 
@@ -139,7 +142,7 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
     by_place = {(one.transmitted, round(one.theta, 9), one.wavelength): one for one in data.slices}
     for way, theta, wave in itertools.product(ways, thetas, listed):
         one = by_place[way, theta, None if waves == [None] else wave]
-        lines += [f"{100.0 * one.integral():.12g}", *table_rows(one)]
+        lines += [f"{100.0 * max(one.integral(), 0.0):.12g}", *table_rows(one)]
     stream.write(("\n".join([*lines, "End of file"]) + "\n").encode("ascii"))
     return () if data.both_sides else ("only light that meets the front is written",)
 

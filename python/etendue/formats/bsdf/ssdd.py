@@ -16,6 +16,7 @@ import numpy.typing as npt
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.functions import AZIMUTH_STEP, RADIAL, sampled, values_on
+from etendue.formats.bsdf.points import below_zero
 from etendue.formats.bsdf.regular import KEYS, regular_of
 from etendue.formats.bsdf.tokens import ADVICE, LARGEST
 from etendue.formats.encodings import decoded
@@ -70,7 +71,8 @@ def read(path: Path) -> BsdfData:
         data = file.read(LARGEST + 1)
     if len(data) > LARGEST:
         raise FormatError(path, "length", "more than 256 MiB", "No table of a BSDF is so large.")
-    blocks, complaints = _blocks(path, data)
+    blocks = _blocks(path, data)
+    complaints: list[Complaint] = []
     slices: list[BsdfSlice] = []
     components: list[Mapping[str, Any]] = []
     isotropic = True
@@ -79,8 +81,10 @@ def read(path: Path) -> BsdfData:
         complaints += said
         isotropic &= block.lists[1].size <= 1
         if block.kind.startswith("specular"):
-            components.append(_specular(path, block, values))
-        elif SYSTEMS[block.keys["PARAM_TYPE"]] == "half":
+            components.append(_specular(path, block, values, complaints))
+            continue
+        complaints += below_zero(values, f"below line {block.line}")
+        if SYSTEMS[block.keys["PARAM_TYPE"]] == "half":
             slices += _half(path, block, values)
         else:
             slices += _polar(path, block, values)
@@ -96,10 +100,9 @@ def read(path: Path) -> BsdfData:
     )
 
 
-def _blocks(path: Path, data: bytes) -> tuple[list[Block], list[Complaint]]:
+def _blocks(path: Path, data: bytes) -> list[Block]:
     """The blocks of the file; values in ASCII or as float32, little-endian."""
     found: list[Block] = []
-    complaints: list[Complaint] = []
     keys: dict[str, str] = {}
     at, line = 0, 0
     while at < len(data):
@@ -140,14 +143,12 @@ def _blocks(path: Path, data: bytes) -> tuple[list[Block], list[Complaint]]:
             raise FormatError(path, f"line {line}", f"DATA is {keys['DATA'][:20]!r}", "It is ascii or binary.")
         if values is None or not np.isfinite(values).all():
             raise FormatError(path, f"line {line}", f"not {count} finite values", ADVICE)
-        if (negative := int((values < 0.0).sum())) > 0:
-            complaints.append(Complaint("warning", f"below line {begin}", f"{negative} values below 0 became 0"))
-        shaped = np.maximum(values.astype(np.float64), 0.0).reshape(*sizes, colours)
+        shaped = values.astype(np.float64).reshape(*sizes, colours)
         found.append(Block(begin, keys["DATA_TYPE"], keys["COLOR_MODEL"], dict(keys), [*lists, waves], shaped))
         keys = {}
     if not found or "DATA_TYPE" in keys:
         raise FormatError(path, f"line {line}", "a block of data is missing", ADVICE)
-    return found, complaints
+    return found
 
 
 def _numbers(data: bytes, at: int, line: int, count: int, path: Path) -> tuple[Array | None, int, int]:
@@ -197,15 +198,18 @@ def _one_colour(path: Path, block: Block) -> tuple[Array, list[Complaint]]:
     return block.values @ (weights / weights.sum()), [Complaint("note", place, text)]
 
 
-def _specular(path: Path, block: Block, values: Array) -> Mapping[str, Any]:
-    """Shares by angle; of several azimuths the mean."""
+def _specular(path: Path, block: Block, values: Array, complaints: list[Complaint]) -> Mapping[str, Any]:
+    """Shares by angle; of several azimuths the mean. Below 0 they are none: a mirror that takes light away is no finish."""
     share = values[0, 0].mean(axis=0)
     if share.max() > 1.0 + 1e-6:
         raise FormatError(path, f"line {block.line}", f"a specular share of {share.max():.6g}", "Shares are at most 1.")
     angle = block.lists[0]
     if angle[0] < 0.0 or angle[-1] > RIGHT_ANGLE:
         raise FormatError(path, f"line {block.line}", "angles of incidence that are not from 0 to 90°", ADVICE)
-    clipped = np.minimum(share, 1.0)
+    if (share < 0.0).any():
+        found = f"{(share < 0.0).sum()} of {share.size} specular shares are below 0 and became 0, which adds up to"
+        complaints.append(Complaint("warning", f"below line {block.line}", f"{found} {-share.min():.3g} of the light"))
+    clipped = np.clip(share, 0.0, 1.0)
     table: Any = float(clipped[0]) if angle.size == 1 else {"angle": angle.tolist(), "values": clipped.tolist()}
     return {"kind": "mixed", block.kind: table}
 

@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
+from etendue.formats.bsdf.points import below_zero
 from etendue.formats.bsdf.window_xml import DAMAGED, WAYS, block_of, document, read_window
 from etendue.formats.xml_tree import Element
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
-from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]
 
@@ -84,13 +84,13 @@ class _Tree:
         return 1 + max(child.depth() for child in self.children)
 
 
-def _parsed(data: Element, path: Path, rank: int) -> tuple[_Tree, int]:
-    """The tree of a text of nested braces, and how many values were below 0."""
+def _parsed(data: Element, path: Path, rank: int) -> tuple[_Tree, Array]:
+    """The tree of a text of nested braces, and all of its values."""
     text = data.text
     open_branches: list[list[_Tree]] = []
     leaf_from: int | None = None
     root: _Tree | None = None
-    negative = 0
+    leaves: list[Array] = []
 
     def refuse(found: str) -> FormatError:
         return FormatError(path, data.place, found, DAMAGED)
@@ -121,27 +121,27 @@ def _parsed(data: Element, path: Path, rank: int) -> tuple[_Tree, int]:
                 raise refuse(f"a branch of {len(children)}; it has {1 << rank}")
             close(_Tree(rank, None, tuple(children)))
         else:
-            grid, below = _grid(text[leaf_from : brace.start()], rank)
+            grid = _grid(text[leaf_from : brace.start()], rank)
             if grid is None:
                 raise refuse("a leaf that is no grid of finite numbers")
-            negative += below
+            leaves.append(grid.ravel())
             close(_Tree(rank, grid))
         leaf_from = None
     if open_branches or root is None:
         raise refuse("braces that do not close")
-    return root, negative
+    return root, np.concatenate(leaves)
 
 
-def _grid(text: str, rank: int) -> tuple[Array | None, int]:
+def _grid(text: str, rank: int) -> Array | None:
     try:
         values = np.array(text.replace(",", " ").split(), np.float64)
     except ValueError:
-        return None, 0
+        return None
     n = round(max(values.size, 1) ** (1.0 / rank))
     power = n > 0 and n & (n - 1) == 0 and n <= 1 << DEEPEST
     if n**rank != values.size or not power or not np.isfinite(values).all():
-        return None, 0
-    return np.maximum(values, 0.0).reshape((n,) * rank), int((values < 0.0).sum())
+        return None
+    return values.reshape((n,) * rank)
 
 
 def read(path: Path) -> BsdfData:
@@ -162,9 +162,8 @@ def read(path: Path) -> BsdfData:
         if data is None or (basis and basis.casefold() != BASIS.casefold()):
             found = f"the angle basis is {basis[:40]!r}" if data else "there is no ScatteringData"
             raise FormatError(path, block.place, found, f"It is {BASIS}.")
-        tree, negative = _parsed(data, path, rank)
-        if negative:
-            window.complaints.append(Complaint("note", data.place, f"{negative} values below 0 became 0"))
+        tree, values = _parsed(data, path, rank)
+        window.complaints += below_zero(values, data.place)
         for place, beta in _incidences(tree):
             slices.append(_slice(tree, place, beta, front=front, transmitted=transmitted))
     return window.data(slices, isotropic=rank == 3)

@@ -15,6 +15,7 @@ from etendue.errors import UnsupportedFormatError
 from etendue.formats.bsdf import tracepro_tables
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.functions import values_on
+from etendue.formats.bsdf.points import below_zero
 from etendue.formats.bsdf.regular import regular_of
 from etendue.formats.bsdf.tracepro_balance import Lit, chosen, only, unbalanced
 from etendue.formats.bsdf.tracepro_lines import (
@@ -206,6 +207,7 @@ def _by_numbers(
         if scatter == LISTED:
             blocks = tracepro_tables.blocks_of(lines, rows, side.begin, side.end)
             own, f = tracepro_tables.profiles_of(lines, rows, blocks)
+            complaints += below_zero(f)
             if lit and not np.array_equal(own, beta):
                 raise lines.refuse(side.begin, "the ScatterBeta of both sides are not the same")
             beta = own

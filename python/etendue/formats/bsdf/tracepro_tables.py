@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError, UnsupportedFormatError
+from etendue.formats.bsdf.points import below_zero
 from etendue.formats.bsdf.shares import CLOSE
 from etendue.formats.bsdf.tokens import ADVICE
 from etendue.formats.bsdf.tracepro_lines import TABLE_COLUMNS, Lines, Rows, once_at_the_normal
@@ -65,7 +66,8 @@ def slices_of(lines: Lines, shares: Rows, blocks: dict[Key, Rows], *, front: boo
         If a table is not complete.
     """
     several = len({key[0] for key in blocks}) > 1
-    slices, complaints = [], []
+    slices = []
+    complaints = below_zero(np.concatenate([block.values[:, 6:].ravel() for block in blocks.values()]))
     left = {_key(key): max(float(value), 0.0) for key, value in zip(shares.values[:, 1:4], shares.left, strict=True)}
     largest = max(blocks.values(), key=lambda block: len(block.line)).values
     lists = np.unique(largest[:, 4]), np.unique(largest[:, 5])
@@ -94,17 +96,16 @@ def slices_of(lines: Lines, shares: Rows, blocks: dict[Key, Rows], *, front: boo
         light = (180.0 + (0.0 if turning else phi)) % 360.0
         incident = light_from(theta, light, behind=not front)
         grid = PolarGrid("cosines", beta, azimuth - forwards(light, turning=turning))
-        f = np.maximum(values, 0.0)
         stated = left.get((wavelength, theta, phi))
         colour = 1e3 * wavelength if several else None
         both = [
             BsdfSlice(
                 incident,
-                f[int(transmitted)],
+                values[int(transmitted)],
                 transmitted,
                 grid=grid,
                 wavelength=colour,
-                stated=stated if f[int(transmitted)].any() and not f[int(not transmitted)].any() else None,
+                stated=stated if values[int(transmitted)].any() and not values[int(not transmitted)].any() else None,
             )
             for transmitted in (False, True)
         ]
@@ -145,5 +146,5 @@ def profiles_of(lines: Lines, shares: Rows, blocks: dict[Key, Rows]) -> tuple[Ar
             found = f"a one-dimensional table of ScatterBeta from {beta[0]:g} to {beta[-1]:g}"
             advice = "It is read with values on both sides of 0, and none beyond 2. Export it as an asymmetric table."
             raise UnsupportedFormatError(lines.path, place, found, advice)
-        f[:, row] = np.maximum(block.values[order, 6:].T, 0.0)
+        f[:, row] = block.values[order, 6:].T
     return first, f

@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.functions import values_on
+from etendue.formats.bsdf.points import below_zero
 from etendue.formats.bsdf.shares import disagreements
 from etendue.formats.bsdf.tokens import Tokens
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
-from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def read(path: Path) -> BsdfData:
     mirrored = symmetry == "PlaneSymmetrical"
     grid, order = _grid(tokens, azimuths, radial, mirrored=mirrored)
     slices: list[BsdfSlice] = []
-    complaints: list[Complaint] = []
+    read_values: list[Array] = []
     for channel in CHANNELS if spectral == "XYZ" else ("Monochrome",):
         tokens.expect(channel)
         tokens.expect("DataBegin")
@@ -78,21 +78,19 @@ def read(path: Path) -> BsdfData:
                 values = tokens.numbers("values", azimuths.size * radial.size).reshape(azimuths.size, radial.size)
                 if not taken:
                     continue
-                if values.min() < 0.0:
-                    place = f"{theta:g}° of incidence"
-                    complaints.append(Complaint("warning", place, f"{(values < 0.0).sum()} values below 0 became 0"))
+                read_values.append(values)
                 slices.append(
                     BsdfSlice(
                         # A sample turned counter-clockwise sees the light come from where it is turned away from.
                         light_from(theta, (180.0 - rotation) % 360.0),
-                        np.maximum(values, 0.0)[order],
+                        values[order],
                         transmitted,
                         grid=grid,
                         stated=stated,
                     )
                 )
         tokens.expect("DataEnd")
-    complaints += disagreements(slices)
+    complaints = [*below_zero(np.array(read_values)), *disagreements(slices)]
     return BsdfData(
         tuple(slices),
         isotropic=rotations.size == 1,
