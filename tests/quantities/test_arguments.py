@@ -15,6 +15,11 @@ VALUES = 10.0 + 10.0 * np.arange(16.0).reshape(4, 4)
 LMAP = et.LuminanceMap(VALUES, 0.1 * VALUES, np.full((4, 4), 100), et.Observer(30, 0, 1000), et.Screen(8, 8, 4, 4))
 SQUARE = et.Region(-2, 2, -2, 2)
 NO_NUMBERS = ("0", None, [1.0, 2.0], LMAP)
+NO_ARRAYS = (None, "0", "a.csv", ["1", "b"], {"a": 1}, LMAP, [[1.0, 2.0], [3.0]])
+NO_POINTS = (None, "123", 5.0, (0, 0), (0, 0, 0, 0), ("a", "b", "c"), (0, 0, np.nan), LMAP)
+EMAP = et.IlluminanceMap(VALUES, VALUES, np.full((4, 4), 100), et.Screen(8, 8, 4, 4, "xy"))
+SCAN = et.GoniometerScan(np.arange(-5.0, 6.0), np.exp(-(np.arange(-5.0, 6.0) ** 2)), solid_angle=1e-3)
+PAINT = et.bsdf.Lambertian(reflectance=0.5)
 NOTHING_KNOWN = ("lamp.ies", None, 3.5, [], {}, LMAP)
 
 CALLS: dict[str, tuple[Callable[[Any], object], tuple[Any, ...]]] = {
@@ -66,6 +71,138 @@ CALLS: dict[str, tuple[Callable[[Any], object], tuple[Any, ...]]] = {
     "LightField.fit: rays": (et.LightField.fit, ("lamp.tm25ray", None, LMAP)),
     "parse_surface: text": (et.parse_surface, (None, 3, et.Disk(radius=3))),
     "path is": (et.read_rays, (None, 3.5, [])),
+    # --- arrays of constructors -------------------------------------------------------------------------------------------
+    "Intensity: c ": (lambda wrong: et.Intensity(wrong, TABLE.gamma, TABLE.values), NO_ARRAYS),
+    "Intensity: gamma ": (lambda wrong: et.Intensity(TABLE.c, wrong, TABLE.values), NO_ARRAYS),
+    "Intensity: values ": (lambda wrong: et.Intensity(TABLE.c, TABLE.gamma, wrong), NO_ARRAYS),
+    "Intensity: standard_error ": (lambda wrong: et.Intensity(TABLE.c, TABLE.gamma, TABLE.values, wrong), NO_ARRAYS),
+    "Intensity: luminaire ": (
+        lambda wrong: et.Intensity(TABLE.c, TABLE.gamma, TABLE.values, luminaire=wrong),
+        (None, "lamp", 3),
+    ),
+    "Intensity: C ": (lambda wrong: TABLE.at(wrong, 0), NO_ARRAYS),
+    "LuminanceMap: values ": (lambda wrong: LMAP.replace(values=wrong), NO_ARRAYS),
+    "LuminanceMap: standard_error ": (lambda wrong: LMAP.replace(standard_error=wrong), NO_ARRAYS),
+    "LuminanceMap: rays ": (lambda wrong: LMAP.replace(rays=wrong), NO_ARRAYS),
+    "LuminanceMap: screen ": (lambda wrong: LMAP.replace(screen=wrong), (None, (8, 8, 4, 4), "8,8,4,4")),
+    "IlluminanceMap: values ": (lambda wrong: EMAP.replace(values=wrong), NO_ARRAYS),
+    "IlluminanceMap: screen ": (lambda wrong: EMAP.replace(screen=wrong), (None, (8, 8, 4, 4), LMAP)),
+    "IlluminanceMap: centre ": (lambda wrong: EMAP.replace(centre=wrong), NO_POINTS),
+    "IlluminanceMap: right ": (lambda wrong: EMAP.replace(right=wrong), NO_POINTS),
+    "RaySet: position ": (lambda wrong: et.RaySet(wrong, [[0, 0, 1]], [1]), NO_ARRAYS),
+    "RaySet: direction ": (lambda wrong: et.RaySet([[0, 0, 0]], wrong, [1]), NO_ARRAYS),
+    "RaySet: flux ": (lambda wrong: et.RaySet([[0, 0, 0]], [[0, 0, 1]], wrong), NO_ARRAYS),
+    "RaySet: wavelength ": (
+        lambda wrong: et.RaySet([[0, 0, 0]], [[0, 0, 1]], [1], wavelength=wrong),
+        tuple(wrong for wrong in NO_ARRAYS if wrong is not None),
+    ),
+    "spectra": (
+        lambda wrong: et.RaySet([[0, 0, 0]], [[0, 0, 1]], [1], spectra=wrong),
+        (None, 3, "led.csv", [550.0], et.Spectrum([555.0], [1.0])),
+    ),
+    "Spectrum: wavelength ": (lambda wrong: et.Spectrum(wrong, [1.0]), NO_ARRAYS),
+    "Spectrum: weight ": (lambda wrong: et.Spectrum([500.0], wrong), NO_ARRAYS),
+    "GoniometerScan: angle ": (lambda wrong: et.GoniometerScan(wrong, [1.0]), NO_ARRAYS),
+    "GoniometerScan: flux ": (lambda wrong: et.GoniometerScan([0.0], wrong), NO_ARRAYS),
+    "GoniometerScan: incidence ": (lambda wrong: et.GoniometerScan([0.0], [1.0], incidence=wrong), NO_NUMBERS),
+    "GoniometerScan: solid_angle ": (lambda wrong: et.GoniometerScan([0.0], [1.0], solid_angle=wrong), ("1", LMAP)),
+    "DirectionalScan: direction ": (lambda wrong: et.DirectionalScan(wrong, [1.0]), NO_ARRAYS),
+    "DirectionalScan: flux ": (lambda wrong: et.DirectionalScan([[0, 0, 1.0]], wrong), NO_ARRAYS),
+    # --- settings ---------------------------------------------------------------------------------------------------------
+    **{
+        f"ScatterGoniometer: {name} ": (
+            lambda wrong, name=name: et.ScatterGoniometer(**{name: wrong}),
+            NO_NUMBERS if name != "photons" else ("0", [1.0, 2.0], LMAP),
+        )
+        for name in ("beam_diameter", "aperture_diameter", "distance", "wavelength", "divergence", "drift", "photons")
+    },
+    "profile of a beam ": (lambda wrong: et.ScatterGoniometer(profile=wrong), ("flat", None, {}, [1, "b"], LMAP)),
+    **{
+        f"NearFieldGoniophotometer: {name} ": (
+            lambda wrong, name=name: et.NearFieldGoniophotometer(**{name: wrong}),
+            NO_NUMBERS,
+        )
+        for name in ("step", "camera_pixels", "bits", "full_well", "level", "photometer_error", "arm_error")
+    },
+    "NearFieldGoniophotometer: distance ": (lambda wrong: et.NearFieldGoniophotometer(30, wrong), ("0", [1.0, 2.0])),
+    "NearFieldGoniophotometer: misalignment ": (
+        lambda wrong: et.NearFieldGoniophotometer(misalignment=wrong),
+        tuple(wrong for wrong in NO_POINTS if wrong is not None),
+    ),
+    "Detector: rate ": (lambda wrong: et.Detector(wrong, 1e5), NO_NUMBERS),
+    "Detector: filters ": (lambda wrong: et.Detector(1e9, 1e5, filters=wrong), NO_ARRAYS),
+    "Baffle: length ": (lambda wrong: et.Baffle(24.0, wrong), NO_NUMBERS),
+    "RingSource: radii ": (et.RingSource, (*NO_ARRAYS, 30.0)),
+    "RingSource: flux ": (lambda wrong: et.RingSource(flux=wrong), (*NO_ARRAYS, 100.0)),
+    **{
+        f"RingSource: {name} ": (lambda wrong, name=name: et.RingSource(**{name: wrong}), (*NO_NUMBERS, 1e6))
+        for name in ("rays", "runs", "seed")
+    },
+    "Observer: target ": (lambda wrong: et.Observer(0, 0, 1000, target=wrong), NO_POINTS),
+    "Observer: up ": (
+        lambda wrong: et.Observer(90, 0, 1000, up=wrong),
+        (*(wrong for wrong in NO_POINTS if wrong is not None), (0, 0, 0)),
+    ),
+    # --- functions --------------------------------------------------------------------------------------------------------
+    "beam_angle: about": (lambda wrong: et.beam_angle(TABLE, about=wrong), ("0", [1.0], LMAP)),
+    "agreement: lobes": (et.agreement, (None, 3, SCAN)),
+    "agreement: one of the lobes": (et.agreement, (["a.csv", "b.csv"], [LMAP, LMAP], "ab")),
+    "agreement: floor": (lambda wrong: et.agreement([SCAN, SCAN], floor=wrong), NO_NUMBERS),
+    "bsdf_table: lobes": (et.bsdf_table, (None, 3, LMAP)),
+    "bsdf_table: one of the lobes": (et.bsdf_table, ("scan.csv", ["scan.csv"], [SCAN])),
+    "revolved: scan": (et.revolved, ("scan.csv", None, LMAP)),
+    "revolved: values": (lambda wrong: et.revolved(SCAN, wrong), ("x", [1, "b"], {})),
+    "revolved: middle": (lambda wrong: et.revolved(SCAN, middle=wrong), ("0", LMAP)),
+    "deconvolve: middle": (lambda wrong: et.deconvolve(SCAN, SCAN, middle=wrong), ("0", LMAP)),
+    "stop is": (lambda wrong: et.deconvolve(SCAN, SCAN, stop=wrong), ([3], {}, 2.5)),
+    "diagnose: field": (et.diagnose, ("lamp.tm25ray", None, LMAP, et.RingSource(rays=10))),
+    "threshold_sweep: rays": (lambda wrong: et.threshold_sweep(wrong, et.Disk(radius=30)), ("a.tm25ray", None, LMAP)),
+    "threshold_sweep: surface": (lambda wrong: et.threshold_sweep(et.RingSource(rays=10), wrong), ("auto", None, 30.0)),
+    "threshold_sweep: thresholds": (
+        lambda wrong: et.threshold_sweep(et.RingSource(rays=10), et.Disk(radius=30), 10.0, wrong),
+        ("5", None, ["5", "x"]),
+    ),
+    "pixel is": (lambda wrong: et.threshold_sweep(et.RingSource(rays=10), et.Disk(radius=30), wrong), ("1", None)),
+    "gamma_step is": (lambda wrong: et.intensity_distribution(et.RingSource(rays=10), 4, wrong), ("5", [5.0], LMAP)),
+    "LightField.fit: surface": (lambda wrong: et.LightField.fit(et.RingSource(rays=10), wrong), (None, 30.0, LMAP)),
+    "GriddedSource.fit: rays": (lambda wrong: et.GriddedSource.fit(wrong, et.Disk(radius=30)), ("a.tm25ray", None)),
+    "report_source: observers": (
+        lambda wrong: et.report_source(et.RingSource(rays=10).ray_set(), observers=wrong),
+        (3, et.Observer(0, 0, 1000)),
+    ),
+    "sweep: parameters": (lambda wrong: et.sweep(et.Scene(), wrong, "flux"), (None, "lamp.flux", ["lamp.flux"])),
+    "resume is": (
+        lambda wrong: et.trace(et.Scene(sources=[{"kind": "point", "flux": 1}]), 10, resume=wrong),
+        (3, LMAP, [1]),
+    ),
+    "total flux is": (lambda wrong: et.RingSource(rays=10).ray_set().with_total_flux(wrong), NO_NUMBERS),
+    "scale factor is": (lambda wrong: et.RingSource(rays=10).ray_set().scaled(wrong), NO_NUMBERS),
+    "subset: n is": (lambda wrong: et.RingSource(rays=10).ray_set().subset(wrong, 1), (*NO_NUMBERS, 1e6)),
+    "merge: sets": (et.RaySet.merge, (None, 3, LMAP)),
+    "merge: one of the sets": (et.RaySet.merge, (["a.tm25ray"], "a.tm25ray", [LMAP])),
+    "bsdf is": (et.ScatterGoniometer().measure, ("paint.bsdf", None, LMAP)),
+    "theta is": (lambda wrong: et.ScatterGoniometer().measure(PAINT, wrong, way="reflected"), NO_NUMBERS),
+    "step is": (lambda wrong: et.ScatterGoniometer().measure(PAINT, step=wrong), NO_NUMBERS),
+    # --- pictures ---------------------------------------------------------------------------------------------------------
+    "plot_bsdf: bsdf": (et.plot_bsdf, NOTHING_KNOWN),
+    "plot_bsdf: incidence": (lambda wrong: et.plot_bsdf(PAINT, incidence=wrong), NO_NUMBERS),
+    "plot_deconvolution: found": (et.plot_deconvolution, (*NOTHING_KNOWN, SCAN)),
+    "plot_directions: found": (et.plot_directions, (*NOTHING_KNOWN, SCAN)),
+    "plot_characteristic: diagnostics": (et.plot_characteristic, NOTHING_KNOWN),
+    "plot_near_field: run": (et.plot_near_field, NOTHING_KNOWN),
+    "plot_report: report": (et.plot_report, NOTHING_KNOWN),
+    "plot_threshold_sweep: sweep": (et.plot_threshold_sweep, NOTHING_KNOWN),
+    "plot_animation: path": (lambda wrong: et.plot_animation([LMAP, LMAP], wrong), (None, 3, LMAP)),
+    "plot_animation: vmax": (lambda wrong: et.plot_animation([LMAP, LMAP], "a.gif", vmax=wrong), ("0", [1.0])),
+    "plot: cmap": (lambda wrong: et.plot_map(LMAP, cmap=wrong), (3, ("red", "blue"), LMAP)),
+    "plot_comparison: ": (
+        lambda wrong: et.plot_comparison(et.compare(LMAP, LMAP), labels=wrong),
+        (None, "ab", 3, ("one",), (1, 2)),
+    ),
+    "plot_cross_sections: labels": (
+        lambda wrong: et.plot_cross_sections([et.cross_section(LMAP, x=0)], labels=wrong),
+        (3, "a", LMAP),
+    ),
 }
 """By what the message begins with or names: a call, and what it refuses."""
 
@@ -80,6 +217,29 @@ def test_the_message_names_the_argument(name: str, tmp_path: Path, monkeypatch: 
         assert isinstance(refused.value, ValueError)
         assert name in str(refused.value), given
     assert not list(tmp_path.iterdir())
+
+
+LAMP = et.Scene(sources=[{"name": "lamp", "kind": "point", "flux": 1}])
+RINGS, DISK = et.RingSource(rays=100), et.Disk(radius=30)
+VIEW = (et.Observer(0, 0, 1000), et.Screen(60, 60, 2, 2))
+WITH_PROGRESS: dict[str, Callable[[Any], object]] = {
+    "luminance_map": lambda wrong: et.luminance_map(RINGS, *VIEW, progress=wrong),
+    "intensity_distribution": lambda wrong: et.intensity_distribution(RINGS, progress=wrong),
+    "threshold_sweep": lambda wrong: et.threshold_sweep(RINGS, DISK, progress=wrong),
+    "LightField.fit": lambda wrong: et.LightField.fit(RINGS, DISK, progress=wrong),
+    "GriddedSource.fit": lambda wrong: et.GriddedSource.fit(RINGS, DISK, progress=wrong),
+    "report_source": lambda wrong: et.report_source(RINGS.ray_set(), progress=wrong),
+    "trace": lambda wrong: et.trace(LAMP, 10, progress=wrong),
+    "sweep": lambda wrong: et.sweep(LAMP, {"lamp.flux": [1, 2]}, "flux", progress=wrong),
+    "NearFieldGoniophotometer.measure": lambda wrong: et.NearFieldGoniophotometer().measure(LAMP, progress=wrong),
+}
+
+
+@pytest.mark.parametrize("name", WITH_PROGRESS)
+def test_progress_is_called_or_none(name: str) -> None:
+    for given in ("bar", 3, True, [], LMAP):
+        with pytest.raises(et.ArgumentError, match=r"^progress is .*; give a function"):
+            WITH_PROGRESS[name](given)
 
 
 def test_what_is_meant_is_said() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from etendue.lightfield.light_field import LightField
-from etendue.quantities.arguments import require
+from etendue.quantities.arguments import require, require_callable
 from etendue.quantities.distinct_rays import DistinctRays
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.node_choice import Choice, choose_nodes
@@ -70,6 +70,7 @@ def intensity_distribution(
     >>> bool(abs(led.at(30, 60) * np.pi / rays.total_flux - 0.5) < 0.01), led.unit, round(led.flux / rays.total_flux, 9)
     (True, 'cd', 1.0)
     """
+    require_callable(progress)
     if isinstance(rays, LightField):
         return rays.intensity(c_planes, gamma_step)
     require(rays, RayStream, "intensity_distribution: rays", "rays, of a file et.read_rays(path), or a LightField")

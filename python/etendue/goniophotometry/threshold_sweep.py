@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import operator
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -21,10 +20,11 @@ from etendue.lightfield.gridded.gridded_source import GriddedSource, check_thres
 from etendue.lightfield.gridded.pixelated import CentreOn, PixelatedSurface
 from etendue.lightfield.gridded.sampling import RECORD
 from etendue.lightfield.surfaces import Surface
+from etendue.quantities.arguments import SURFACE, as_numbers, require, require_callable, require_number
 from etendue.quantities.intensity_nodes import check_steps
 from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.ray_set import RaySet
-from etendue.quantities.ray_stream import Progress, RayBatch, RayStream
+from etendue.quantities.ray_stream import Progress, RayBatch, RayStream, checked_seed
 from etendue.quantities.spool import spool
 from etendue.quantities.threshold_sweep import ThresholdSweep
 from etendue.units import MM2_PER_M2
@@ -92,12 +92,17 @@ def threshold_sweep(
     >>> bool(np.ptp(sweep["ncc"]) < 0.01), float(sweep["threshold"][sweep.best("score")])
     (True, 5.0)
     """
-    if not len(thresholds):
+    require(rays, RayStream, "threshold_sweep: rays", "rays, of a file et.read_rays(path)")
+    require(surface, Surface, "threshold_sweep: surface", SURFACE)
+    require_callable(progress)
+    thresholds = as_numbers(thresholds, "threshold_sweep: thresholds", "flux errors in percent").ravel().tolist()
+    if not thresholds:
         raise ArgumentError("threshold_sweep: give at least one threshold.")
     for threshold in thresholds:
         check_threshold(threshold)
-    if not 0 <= operator.index(seed) < 2**64:
-        raise ArgumentError(f"threshold_sweep: seed {seed}; give 0 to 2^64 - 1.")
+    checked_seed(seed)
+    require(c_planes, int, "threshold_sweep: c_planes", "a whole number of planes")
+    require_number(gamma_step, "threshold_sweep: gamma_step", "an angle above 0° and up to 90°")
     check_steps(c_planes, gamma_step)  # refuses what is no grid before the work begins
     pixels = pixels_for(rays, surface, pixel, parallels, centre_on)
     passes = 6

@@ -12,6 +12,7 @@ from etendue.errors import ArgumentError
 from etendue.instruments.deconvolution import Deconvolution
 from etendue.instruments.goniometer_scan import GoniometerScan, cubic, full_width, summit
 from etendue.instruments.operators import middle_of
+from etendue.quantities.arguments import require, require_number
 
 Array = npt.NDArray[np.float64]
 
@@ -102,6 +103,11 @@ def agreement(lobes: Sequence[GoniometerScan | Deconvolution], *, floor: float =
     >>> bool(et.agreement(scans).peak > 4 and et.agreement(found).peak < 0.1)
     True
     """
+    what = "scans or what et.deconvolve made of them, in a sequence"
+    require(lobes, Sequence, "agreement: lobes", what)
+    for one in lobes:
+        require(one, (GoniometerScan, Deconvolution), "agreement: one of the lobes", f"{what}; read files first")
+    require_number(floor, "agreement: floor", "a part of the peak, above 0 and below 1")
     if len(lobes) < 2:
         raise ArgumentError(f"{len(lobes)} lobe; two are needed at least")
     if not 0.0 < floor < 1.0:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.arguments import as_numbers
 from etendue.quantities.quadrature import gauss_legendre
 
 Array = npt.NDArray[np.float64]
@@ -138,7 +139,8 @@ class Beam:
             if self.profile not in ("uniform", "gaussian"):
                 raise UnknownNameError("profile of a beam", self.profile, ("uniform", "gaussian"))
         else:
-            values = np.asarray(self.profile, np.float64)
+            wanted = "'uniform', 'gaussian', or two or more values from the middle to the edge"
+            values = as_numbers(self.profile, "the profile of a beam", wanted)
             if values.ndim != 1 or values.size < 2 or not np.isfinite(values).all() or (values < 0.0).any():
                 raise ArgumentError(
                     "the profile of a beam is two or more values from the middle to the edge, none below 0"

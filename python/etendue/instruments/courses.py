@@ -11,6 +11,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.instruments.richardson_lucy import deviances, iterations
 from etendue.instruments.stopping import MOST, NEEDS_COUNTS, RULES, Course
+from etendue.quantities.arguments import require
 
 Array = npt.NDArray[np.float64]
 
@@ -47,6 +48,7 @@ def rule_of(stop: str | int | None, *, counted: bool) -> str:
         return f"{stop} iterations"
     if stop is None:
         return next(iter(RULES)) if counted else "thesis"
+    require(stop, str, "stop", f"a number of iterations, or one of {', '.join(RULES)}")
     if stop not in RULES:
         raise UnknownNameError("rule", stop, RULES)
     if not counted and stop in NEEDS_COUNTS:

@@ -16,7 +16,7 @@ from etendue.instruments.courses import after, course_of, rule_of
 from etendue.instruments.goniometer_scan import GoniometerScan, full_width, summit, total_scatter
 from etendue.instruments.operators import Operator, OperatorName, folded, middle_of, operator_of, sparse_if_large
 from etendue.instruments.penalised_lobe import PenalisedLobe, penalised_lobe
-from etendue.quantities.arguments import require
+from etendue.quantities.arguments import require, require_number
 from etendue.quantities.ray_stream import checked_seed
 
 Array = npt.NDArray[np.float64]
@@ -206,6 +206,8 @@ def deconvolve(
         require(
             given, GoniometerScan, f"deconvolve: {name}", "a GoniometerScan: of a file et.read_goniometer_scan(path)"
         )
+    if middle is not None:
+        require_number(middle, "deconvolve: middle", "an angle in °, or None")
     notes = list(scan.notes)
     if scan.angle.size < 5:
         raise ArgumentError(f"a scan of {scan.angle.size} positions; five are needed at least")

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import as_numbers, require_numbers
 
 Array = npt.NDArray[np.float64]
 
@@ -105,6 +106,8 @@ class Detector:
     stray: float = 0.0
 
     def __post_init__(self) -> None:
+        require_numbers(self, "rate", "full_well", "shortest", "longest", "read_noise", "dark")
+        require_numbers(self, "filter_error", "fill", "pause", "stray")
         for name in ("rate", "full_well", "shortest", "longest"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ArgumentError(f"{name} is {getattr(self, name)}; give more than 0")
@@ -117,7 +120,7 @@ class Detector:
             )
         if not 0.0 < self.fill <= 1.0:
             raise ArgumentError(f"a fill of {self.fill:g}; give a part of the well, above 0 and up to 1")
-        given = np.asarray(self.filters, np.float64)
+        given = as_numbers(self.filters, "Detector: filters", "transmittances above 0, up to 1")
         if given.ndim != 1 or not given.size or not ((given > 0.0) & (given <= 1.0)).all():
             raise ArgumentError("filters are transmittances above 0, up to 1; give one at least")
         object.__setattr__(self, "filters", tuple(given.tolist()))
@@ -163,7 +166,7 @@ class Detector:
         >>> [f"{one:.2g}" for one in readings.flux], round(3600 * readings.hours, 3)
         (['0.001', '1e-09'], 2.2)
         """
-        share = np.asarray(flux, np.float64)
+        share = as_numbers(flux, "Detector.read: flux", "fluxes as a share of that of the beam")
         if share.ndim != 1 or not np.isfinite(share).all() or (share < 0.0).any():
             raise ArgumentError("fluxes are a row of numbers that are not negative")
         if seed < 0:
@@ -206,6 +209,7 @@ class Baffle:
     length: float
 
     def __post_init__(self) -> None:
+        require_numbers(self, "opening", "length", instead="a length in mm")
         if not (0.0 < self.opening < math.inf and 0.0 < self.length < math.inf):
             raise ArgumentError("the opening of a baffle and its distance from the aperture are more than 0")
 

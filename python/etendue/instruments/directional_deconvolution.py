@@ -28,7 +28,7 @@ from etendue.instruments.regular_share import RegularShare, regular_share
 from etendue.instruments.round_blur import RoundBlur
 from etendue.instruments.scatter_goniometer import ScatterGoniometer
 from etendue.instruments.total_variation import STRENGTHS, total_variation
-from etendue.quantities.arguments import require
+from etendue.quantities.arguments import require, require_number
 from etendue.quantities.bsdf_data import BsdfSlice
 from etendue.quantities.ray_stream import checked_seed
 from etendue.scatter.lobe_models import LOBE_MODELS, Fitted
@@ -239,6 +239,7 @@ def deconvolve_directions(
     """
     if method not in get_args(DirectionalMethod):
         raise UnknownNameError("method", method, get_args(DirectionalMethod))
+    require(replicates, int, "deconvolve_directions: replicates", "a whole number, 0 or 2 and more")
     if replicates and replicates < 2:
         raise ArgumentError("one replicate has no spread; draw two or more, or none")
     seed = checked_seed(seed)
@@ -247,6 +248,7 @@ def deconvolve_directions(
         wanted = "a ScatterGoniometer, or a scan of the bare beam: of a file et.read_goniometer_scan(path)"
         kinds = (ScatterGoniometer, Bench, GoniometerScan)
         require(instrument, kinds, "deconvolve_directions: instrument", wanted)
+    require_number(regular, "deconvolve_directions: regular", "True, False, or a share from 0 to 1")
     of = _instrument(scan, instrument)
     notes = [*scan.notes, *_doubts(scan, of)]
     model = forward_model(of, scan, cell)

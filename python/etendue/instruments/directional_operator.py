@@ -14,6 +14,7 @@ from etendue.extras import scipy_part
 from etendue.instruments.bench import Sight
 from etendue.instruments.directional_scan import DirectionalScan
 from etendue.instruments.lobe_splines import LobeSplines, splines_for
+from etendue.quantities.arguments import require_number
 
 Array = npt.NDArray[np.float64]
 
@@ -88,6 +89,8 @@ def forward_model(instrument: Instrument, scan: DirectionalScan, cell: float | N
     ArgumentError
         If a cell is impossible.
     """
+    if cell is not None:
+        require_number(cell, "cell", "the width of the finest splines in °, or None")
     step = float(np.quantile(scan.spacing, 0.1))
     width = min(step, WIDTH_OF_A_CELL * instrument.reach) if cell is None else float(cell)
     if not 0.01 <= width <= 30.0:

@@ -17,6 +17,7 @@ from etendue.formats.scans_csv import DIRECTIONS, ERROR, POLAR, read_columns, re
 from etendue.instruments.bench import Bench
 from etendue.instruments.goniometer_scan import GoniometerScan, Way, flux_of_unit_bsdf, known_of, read_goniometer_scan
 from etendue.instruments.lobe_table import polar_slice
+from etendue.quantities.arguments import as_numbers, require_numbers
 from etendue.quantities.bsdf_data import BsdfSlice, direction, light_from
 
 Array = npt.NDArray[np.float64]
@@ -79,7 +80,7 @@ class DirectionalScan:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        arms = np.array(self.direction, np.float64)
+        arms = as_numbers(self.direction, "DirectionalScan: direction", "unit vectors, shape (n, 3)", copy=True)
         if arms.ndim != 2 or arms.shape[1] != 3 or not len(arms):
             raise ArgumentError(f"directions have shape (n, 3), not {arms.shape}")
         if not (np.abs(np.linalg.norm(arms, axis=1) - 1.0) < SAME).all():
@@ -89,9 +90,9 @@ class DirectionalScan:
         object.__setattr__(self, "direction", arms)
         for name in ("flux", "standard_error"):
             given = getattr(self, name)
-            if given is None:
+            if given is None and name == "standard_error":
                 continue
-            values = np.array(given, np.float64)
+            values = as_numbers(given, f"DirectionalScan: {name}", "a row of numbers", copy=True)
             if values.shape != arms.shape[:1]:
                 raise ArgumentError(f"{name} has shape {values.shape}; there are {len(arms)} directions")
             if not np.isfinite(values).all():
@@ -108,6 +109,8 @@ class DirectionalScan:
             raise ArgumentError(f"{len(arms) - len(rounded)} directions stand twice; give each once")
         if self.standard_error is not None and (self.standard_error < 0.0).any():
             raise ArgumentError("standard errors are not negative")
+        require_numbers(self, "incidence", "background")
+        require_numbers(self, "solid_angle", none=True)
         if not 0.0 <= self.incidence < 90.0:
             raise ArgumentError(f"an angle of incidence of {self.incidence:g}°; give 0 to below 90°")
         if self.solid_angle is not None and not self.solid_angle > 0.0:

@@ -18,6 +18,7 @@ from etendue.formats.output import atomic_output
 from etendue.formats.scans_csv import DIRECTIONS, ERROR, POSITIONS, read_columns, read_remarks
 from etendue.instruments.positions import Plane, detector_directions
 from etendue.instruments.ring_sum import sum_of_rings
+from etendue.quantities.arguments import as_numbers, require_numbers
 from etendue.quantities.bsdf_data import light_from
 from etendue.scatter.scans.scans import Scans
 
@@ -119,9 +120,9 @@ class GoniometerScan:
     def __post_init__(self) -> None:
         for name in ("angle", "flux", "standard_error"):
             given = getattr(self, name)
-            if given is None:
+            if given is None and name == "standard_error":
                 continue
-            values = np.array(given, np.float64)
+            values = as_numbers(given, f"GoniometerScan: {name}", "a row of numbers", copy=True)
             if values.ndim != 1 or values.shape != np.shape(self.angle) or not values.size:
                 raise ArgumentError(
                     f"{name} has shape {values.shape}, the angles {np.shape(self.angle)}; give one for each"
@@ -138,6 +139,8 @@ class GoniometerScan:
             raise ArgumentError(f"angles increase; after {self.angle[at]:g}° comes {self.angle[at + 1]:g}°")
         if self.standard_error is not None and (self.standard_error < 0.0).any():
             raise ArgumentError("standard errors are not negative")
+        require_numbers(self, "incidence", "background")
+        require_numbers(self, "solid_angle", none=True)
         if not 0.0 <= self.incidence < 90.0:
             raise ArgumentError(f"incidence is {self.incidence:g}°; light meets a sample at 0 to below 90°")
         if self.way not in get_args(Way):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import require
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid
 from etendue.scatter.table import BsdfTable
 
@@ -24,6 +25,7 @@ NEAR_RIM = 0.98
 """Direction cosine of a position from which on a scan is one of the hemisphere, and f goes on to its rim."""
 
 
+@runtime_checkable
 class Lobe(Protocol):
     """What tables are made of."""
 
@@ -33,6 +35,12 @@ class Lobe(Protocol):
     @property
     def regular_share(self) -> float:
         """What of the light is mirrored or goes straight on."""
+
+
+LOBES = (
+    "scans or deconvolutions in a sequence: of a file et.read_directional_scan(path), or et.deconvolve_directions(scan)"
+)
+"""What to give where lobes are wanted."""
 
 
 def bsdf_table(lobes: Sequence[Lobe], *, isotropic: bool = True, name: str = "") -> BsdfTable:
@@ -67,6 +75,9 @@ def bsdf_table(lobes: Sequence[Lobe], *, isotropic: bool = True, name: str = "")
     >>> bool(abs(float(table.reflectance(30)) / float(sample.reflectance(30)) - 1) < 0.02)
     True
     """
+    require(lobes, Sequence, "bsdf_table: lobes", LOBES)
+    for one in lobes:
+        require(one, Lobe, "bsdf_table: one of the lobes", LOBES)
     if not lobes:
         raise ArgumentError("a table is made of one scan or more")
     slices = [one.slice() for one in lobes]

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import require_number
 from etendue.quantities.bsdf_data import PolarGrid, direction
 
 Array = npt.NDArray[np.float64]
@@ -33,6 +34,8 @@ def even_angles(middle: float, step: float, span: float) -> Array:
     >>> even_angles(30.0, 0.5, 1.0).tolist()
     [29.0, 29.5, 30.0, 30.5, 31.0]
     """
+    require_number(step, "step", "the angle between positions in °")
+    require_number(span, "span", "the angle to the last position on both sides in °")
     if not 0.0 < step < 90.0 or not 0.0 < span <= 180.0 or span / step > MOST:
         raise ArgumentError(f"steps of {step:g}° to {span:g}° on both sides; give a step and a span of more than 0")
     k = int(np.floor(span / step + 1e-9))

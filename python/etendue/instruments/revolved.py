@@ -8,6 +8,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError
 from etendue.instruments.goniometer_scan import GoniometerScan, cubic
 from etendue.instruments.operators import middle_of
+from etendue.quantities.arguments import as_numbers, require, require_number
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
 from etendue.scatter.table import BsdfTable
 
@@ -55,12 +56,15 @@ def revolved(
     >>> [round(float(one.evaluate([0, 0, 1], [0, 0, -1])), -1) for one in (blurred, sharp, sample)]
     [390.0, 500.0, 500.0]
     """
+    require(scan, GoniometerScan, "revolved: scan", "a GoniometerScan: of a file et.read_goniometer_scan(path)")
+    if middle is not None:
+        require_number(middle, "revolved: middle", "an angle in °, or None")
     if not scan.sample or scan.incidence:
         what = f"a sample at {scan.incidence:g}°" if scan.sample else "the bare beam"
         raise ArgumentError(
             f"a scan of {what}; only at normal incidence is a lobe round: `etendue bsdf fit` makes tables of others"
         )
-    f = scan.bsdf if values is None else np.asarray(values, np.float64)
+    f = scan.bsdf if values is None else as_numbers(values, "revolved: values", "f at each position")
     if f.shape != scan.angle.shape:
         raise ArgumentError(f"{f.size} values for {scan.angle.size} positions")
     if scan.angle.size < 5 or not (f > 0.0).any():

@@ -24,6 +24,7 @@ from etendue.instruments.positions import (
 from etendue.instruments.ray_counting import counted_flux
 from etendue.instruments.sight_quadrature import integrated_flux
 from etendue.instruments.turned_sample import TurnedSample
+from etendue.quantities.arguments import as_numbers, require, require_number, require_numbers
 from etendue.quantities.bsdf_data import BsdfSlice, direction, light_from
 from etendue.scatter.bsdf import Bsdf
 
@@ -119,6 +120,9 @@ class ScatterGoniometer:
     head_diameter: float = 0.0
 
     def __post_init__(self) -> None:
+        require_numbers(self, "beam_diameter", "aperture_diameter", "distance", "inner_diameter", "head_diameter")
+        require_numbers(self, "divergence", "source_angle", "wavelength", "dark", "drift")
+        require_numbers(self, "photons", none=True)
         for name in ("beam_diameter", "aperture_diameter", "distance", "wavelength"):
             if not 0.0 < getattr(self, name) < np.inf:
                 unit = "nm" if name == "wavelength" else "mm"
@@ -298,7 +302,7 @@ class ScatterGoniometer:
         if method not in get_args(Method):
             raise UnknownNameError("method", method, get_args(Method))
         _require_incidence(theta)
-        arms = np.asarray(directions, np.float64)
+        arms = as_numbers(directions, "directions", "unit vectors, shape (n, 3)")
         if arms.ndim != 2 or arms.shape[1] != 3 or not (np.abs(np.einsum("ij,ij->i", arms, arms) - 1.0) < 1e-6).all():
             raise ArgumentError("directions are unit vectors, shape (n, 3)")
         flux, error = np.zeros(len(arms)), np.zeros(len(arms))
@@ -531,11 +535,13 @@ def _left_out(shadowed: npt.NDArray[np.bool_]) -> str:
 
 
 def _require_incidence(theta: float) -> None:
+    require_number(theta, "theta", "an angle of incidence from 0 to below 90°")
     if not 0.0 <= theta < 90.0:
         raise ArgumentError(f"an angle of incidence of {theta:g}°; give 0 to below 90°")
 
 
 def _way(bsdf: Bsdf, way: Way | None) -> Way:
+    require(bsdf, Bsdf, "bsdf", "a Bsdf: a model of et.bsdf, or of a file et.read_bsdf(path)")
     if way is not None:
         if way not in get_args(Way):
             raise UnknownNameError("way", way, get_args(Way))

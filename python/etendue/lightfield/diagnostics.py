@@ -20,8 +20,9 @@ from etendue.lightfield.forecast import Forecast, Predicted, make_forecast
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.resolution import Resolution
 from etendue.lightfield.trees import Base
+from etendue.quantities.arguments import require, require_callable
 from etendue.quantities.measured import measured
-from etendue.quantities.ray_stream import RayStream, checked_threads
+from etendue.quantities.ray_stream import RayStream, checked_seed, checked_threads
 from etendue.units import LUMINANCE_UNIT, MM2_PER_M2, FluxUnit
 
 BOXES = 8
@@ -193,13 +194,17 @@ def diagnose(
     >>> bool(diagnostics.lead > 0), len(diagnostics.spots), diagnostics.forecast.factor(0.5).value > 4
     (True, 12, True)
     """
+    require(field, LightField, "diagnose: field", "a LightField: et.LightField.fit(rays)")
+    if rays is not None:
+        require(rays, RayStream, "diagnose: rays", "the rays of the fit, of a file et.read_rays(path), or None")
+    require_callable(progress)
     if not (isinstance(spots, int) and spots >= 0):
         raise ArgumentError(f"spots is {spots!r}; give a whole number, 0 or more.")
     if rays is not None and rays.flux_unit != field.flux_unit:
         raise ArgumentError(
             f"the field is in {field.flux_unit}, the rays are in {rays.flux_unit}; give the rays of the fit, in its unit."
         )
-    threads = checked_threads(threads)
+    threads, seed = checked_threads(threads), checked_seed(seed)
     forecast = None
     if rays is not None:
         forecast = make_forecast(field, rays, seed=seed, threads=threads, progress=progress)

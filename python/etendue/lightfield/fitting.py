@@ -37,7 +37,7 @@ from etendue.lightfield.selection.search import choose_surface
 from etendue.lightfield.surfaces import Plane, Surface
 from etendue.lightfield.symmetry import fold, order, proven_symmetry, refutation
 from etendue.lightfield.trees import POSITIONS, holding_memory
-from etendue.quantities.arguments import require
+from etendue.quantities.arguments import SURFACE, require, require_callable, require_number
 from etendue.quantities.distinct_rays import DistinctRays
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, checked_seed, checked_threads
@@ -120,8 +120,12 @@ def fit_light_field(
     """See `LightField.fit`."""
     threads, seed = checked_threads(threads), checked_seed(seed)
     require(rays, RayStream, "LightField.fit: rays", "rays, of a file et.read_rays(path)")
+    if max_resolution is not None:
+        require_number(max_resolution, "max_resolution", "the side of the finest cells in mm, or None")
     if max_resolution is not None and not 0.0 < max_resolution < math.inf:
         raise ArgumentError(f"max_resolution is {max_resolution}; give the side of the finest cells, a length in mm.")
+    require_callable(progress)
+    require(surface, (str, Surface), "LightField.fit: surface", f"'auto', or {SURFACE}")
     check_near_field(rays)
     told = FitProgress(progress, len(rays), isinstance(surface, str))
     # Of copies some would be held out and others fitted, so that a field that remembers rays would seem to predict them.

@@ -283,6 +283,7 @@ class Plane(Surface):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require_number(self.frames, "Plane: frames", f"a whole number from 0 to {MOST_FRAMES}")
         if not (float(self.frames).is_integer() and 0 <= self.frames <= MOST_FRAMES):
             raise ArgumentError(f"Plane: frames is {self.frames!r}; give a whole number from 0 to {MOST_FRAMES}.")
         object.__setattr__(self, "frames", int(self.frames))

@@ -79,6 +79,10 @@ def plot_animation(
     require(maps, (list, tuple), "plot_animation: maps", "a list of two LuminanceMaps or more")
     for lmap in maps:
         check_luminance_map(lmap, "plot_animation")
+    require(path, (str, os.PathLike), "plot_animation: path", "the path of a moving picture, .gif, .html or .mp4")
+    for name, end in (("vmin", vmin), ("vmax", vmax)):
+        if end is not None:
+            require_number(end, f"plot_animation: {name}", "a luminance, or None")
     require_number(seconds, "plot_animation: seconds", "how long a map stays, 0.02 to 60")
     writer = writer_for(path)
     if not 0.02 <= seconds <= 60.0:

@@ -12,13 +12,13 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError
 from etendue.plot import style
 from etendue.plot.map_picture import draw_slim_bar
+from etendue.quantities.arguments import require, require_number
 from etendue.quantities.bsdf_data import PolarGrid, direction
+from etendue.scatter.bsdf import Bsdf, Side
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from etendue.scatter.bsdf import Bsdf, Side
 
 Array = npt.NDArray[np.float64]
 
@@ -124,6 +124,8 @@ def plot_bsdf(
     >>> len(plot_bsdf(Gaussian(peak=5, sigma=0.15)).axes)
     5
     """
+    require(bsdf, Bsdf, "plot_bsdf: bsdf", "a Bsdf: a model of et.bsdf, or of a file et.read_bsdf(path)")
+    require_number(incidence, "plot_bsdf: incidence", "an angle from 0 to below 90°")
     if not 0.0 <= incidence < 90.0:
         raise ArgumentError(f"incidence is {incidence!r}; give an angle from 0 to below 90°.")
     if ax is not None:

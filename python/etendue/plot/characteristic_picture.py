@@ -15,6 +15,7 @@ from etendue.lightfield.characteristic import CharacteristicCurve
 from etendue.lightfield.diagnostics import Diagnostics, UncertainSpot
 from etendue.lightfield.forecast import Forecast
 from etendue.plot import style
+from etendue.quantities.arguments import require
 from etendue.quantities.measured import measured
 from etendue.units import LUMINANCE_NAME, LUMINANCE_UNIT, FluxUnit
 
@@ -98,6 +99,7 @@ def plot_characteristic(
     >>> [axes.get_ylabel() for axes in plot_characteristic(diagnose(field)).axes]
     ['luminance [cd/m²]', 'flux [lm]']
     """
+    require(diagnostics, Diagnostics, "plot_characteristic: diagnostics", "what et.diagnose(field) gives")
     forecast = diagnostics.forecast
     heading = title if title is not None else "Light field"
     if ax is not None:

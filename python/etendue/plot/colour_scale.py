@@ -11,6 +11,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.extras import require
 from etendue.plot import style
+from etendue.quantities.arguments import require as require_kind
 
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap, Normalize
@@ -93,6 +94,7 @@ def colour_map(colours: str, wanted: str | Colormap | None = None) -> Colormap:
     """
     mpl = require("matplotlib")
     name = style.COLOUR_MAPS[colours] if wanted is None else wanted
+    require_kind(name, (str, mpl.colors.Colormap), "plot: cmap", "the name of a colour map of matplotlib, or one")
     if isinstance(name, str) and name not in mpl.colormaps:
         raise UnknownNameError("colour map", name, mpl.colormaps)
     found: Colormap = mpl.colormaps.get_cmap(name).with_extremes(bad=style.DEAD)

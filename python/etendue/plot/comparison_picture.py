@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args, overload
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import UnknownNameError
+from etendue.errors import ArgumentError, UnknownNameError
 from etendue.luminance.comparison import Comparison
 from etendue.plot import style
 from etendue.plot.colour_scale import Scale, choose_scale, colour_map, normalisation, signed_normalisation
@@ -131,6 +131,11 @@ def plot_comparison(
         raise UnknownNameError("difference", difference, DIFFERENCES)
     reference = comparison.reference
     chosen = choose_scale(np.stack((comparison.test.values, reference.values)), scale)
+    require(labels, (tuple, list), "plot_comparison: labels", "two names, as ('test', 'reference')")
+    for one in labels:
+        require(one, str, "plot_comparison: one of the labels", "a name for each map")
+    if len(labels) != 2:
+        raise ArgumentError(f"plot_comparison: {len(labels)} labels for two maps; give one for each.")
     shown = _shown(comparison, difference, labels)
     names = axis_names(reference)
     if ax is not None:

@@ -201,6 +201,8 @@ def _check(sections: Sequence[CrossSection], labels: Sequence[str] | None) -> No
     kinds = sorted({f"{section.quantity} [{section.unit}] along {section.axis}" for section in sections})
     if len(kinds) > 1:
         raise ArgumentError(f"plot_cross_sections: cannot share axes: {'; '.join(kinds)}. Draw them one by one.")
+    if labels is not None:
+        require(labels, (tuple, list), "plot_cross_sections: labels", "a list with a name for each section, or None")
     if labels is not None and len(labels) != len(sections):
         raise ArgumentError(
             f"plot_cross_sections: {len(labels)} labels for {len(sections)} sections; give one for each."

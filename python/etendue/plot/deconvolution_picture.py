@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 import numpy.typing as npt
 
+from etendue.instruments.deconvolution import Deconvolution
 from etendue.plot import style
+from etendue.quantities.arguments import require
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from etendue.instruments.deconvolution import Deconvolution
 
 WIDTH, HEIGHT = 11.4, 3.9
 """Of the figure [inches]."""
@@ -89,6 +89,7 @@ def plot_deconvolution(
     >>> len(et.plot_deconvolution(et.deconvolve(scan, goniometer.instrument_function())).axes)
     3
     """
+    require(found, Deconvolution, "plot_deconvolution: found", "what et.deconvolve(scan, signature) gives")
     if ax is not None:
         panels = style.given_axes(ax, 3, path)
         _draw(panels, found)

@@ -10,14 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.extras import scipy_part
+from etendue.instruments.directional_deconvolution import DirectionalDeconvolution
 from etendue.plot import style
 from etendue.plot.map_picture import draw_slim_bar
+from etendue.quantities.arguments import require
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from etendue.instruments.directional_deconvolution import DirectionalDeconvolution
 
 Array = npt.NDArray[np.float64]
 
@@ -103,6 +103,7 @@ def plot_directions(
     >>> len(et.plot_directions(et.deconvolve_directions(scan)).axes)
     6
     """
+    require(found, DirectionalDeconvolution, "plot_directions: found", "what et.deconvolve_directions(scan) gives")
     if ax is not None:
         panels = style.given_axes(ax, 4, path)
         _draw(panels, found)

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from etendue.instruments.near_field.run import NearFieldRun
 from etendue.plot import style
 from etendue.plot.colour_scale import colour_map
 from etendue.plot.map_picture import axis_names, bar_beside, draw_colour_bar, draw_screen
+from etendue.quantities.arguments import require, require_number
 from etendue.quantities.powers_of_ten import counted
 from etendue.units import LUMINANCE_NAME, LUMINANCE_UNIT
 
@@ -20,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
 
-    from etendue.instruments.near_field.run import NearFieldRun
     from etendue.quantities.luminance_map import LuminanceMap
 
 WIDTH, HEIGHT = 11.4, 3.75
@@ -81,6 +82,8 @@ def plot_near_field(
     >>> len(et.plot_near_field(run).axes)                                      # four images and a colour bar
     5
     """
+    require(run, NearFieldRun, "plot_near_field: run", "what et.NearFieldGoniophotometer().measure(lamp) gives")
+    require_number(c, "plot_near_field: c", "an angle in °")
     maps = [run.luminance_map(gamma, c) for gamma in _positions(run, c)]
     if ax is not None:
         panels = style.given_axes(ax, len(maps), path)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.plot.scene_parts import Glow, Part, View, finish_kind, within
-from etendue.quantities.arguments import SCENE, require
+from etendue.quantities.arguments import SCENE, as_numbers, require
 from etendue.scene import MEDIA, Compiled, Medium, Scene, compile_scene
 from etendue.scene.extents import box_of
 from etendue.tracing.section import Section
@@ -139,6 +139,7 @@ def lay_out_scene(
     ([2.0, 2.0, 2.0], 'ball.surface')
     """
     require(scene, Scene, "draw_scene: scene", SCENE)
+    require(section, Sequence, "draw_scene: section", "planes such as 'y=0', or ('y=0', 'x=0')")
     planes = [Section.parse(text) for text in ([section] if isinstance(section, str) else section)]
     if not 1 <= len(planes) <= MOST_SECTIONS:
         raise ArgumentError(f"draw_scene: {len(planes)} sections; give 1 to {MOST_SECTIONS}.")
@@ -151,10 +152,11 @@ def lay_out_scene(
 
 
 def _checked(window: Sequence[float]) -> Window:
-    left, right, bottom, top = window if len(window) == 4 else (0.0,) * 4
+    edges = as_numbers(window, "draw_scene: window", "left, right, bottom, top in mm").ravel().tolist()
+    left, right, bottom, top = edges if len(edges) == 4 else (0.0,) * 4
     if not (np.isfinite([left, right, bottom, top]).all() and left < right and bottom < top):
         raise ArgumentError(
-            f"draw_scene: window is {list(window)}; give left, right, bottom, top in mm with left < right and bottom < top."
+            f"draw_scene: window is {edges}; give left, right, bottom, top in mm with left < right and bottom < top."
         )
     return float(left), float(right), float(bottom), float(top)
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.plot import style
+from etendue.quantities.arguments import require
 from etendue.quantities.threshold_sweep import ThresholdSweep
 
 if TYPE_CHECKING:
@@ -81,6 +82,7 @@ def plot_threshold_sweep(
     >>> [axes.get_ylabel() for axes in figure.axes]
     ['NCC [%]', 'NRMSE [%]', 'held-out score [nat per ray]']
     """
+    require(sweep, ThresholdSweep, "plot_threshold_sweep: sweep", "what et.threshold_sweep(rays, surface) gives")
     if not (len(sweep) >= 2 and (sweep["threshold"] > 0.0).all()):
         raise ArgumentError("plot_threshold_sweep: give a sweep over two or more thresholds above 0 %.")
     heading = title if title is not None else "Threshold of the flux error"

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import numbers
+from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 
@@ -17,6 +22,9 @@ LUMINANCE_OR_ILLUMINANCE = (
 
 SCENE = "a Scene: of a file et.Scene.load(path)"
 """What to give where a scene is wanted."""
+
+SURFACE = "an et.Surface such as et.Disk(radius=30); of a text et.parse_surface(text)"
+"""What to give where a carrier surface is wanted."""
 
 MOST_LETTERS = 40
 """Of a text that is told."""
@@ -88,7 +96,135 @@ def require_number(given: Any, what: str, instead: str = "a number") -> None:
     Traceback (most recent call last):
     etendue.errors.ArgumentError: beam_angle: c is '0'; give an angle in °.
     """
+    if isinstance(given, float | int):  # first, as asking for any kind of number takes longer
+        return
     # An array of one number without axes has the type of its elements, and no iteration.
     scalar = getattr(given, "ndim", None) == 0 and getattr(getattr(given, "dtype", None), "kind", "") in "iuf"
     if not (isinstance(given, numbers.Real) or scalar):
         raise ArgumentError(f"{what} is {described(given)}; give {instead}.")
+
+
+def require_numbers(holder: object, *names: str, instead: str = "a number", none: bool = False) -> None:
+    """Refuse settings that are no real numbers.
+
+    Parameters
+    ----------
+    holder : object
+        What has them as attributes; its class is named.
+    *names : str
+        Of the settings.
+    instead : str
+        What to give.
+    none : bool
+        Whether None is allowed.
+
+    Raises
+    ------
+    ArgumentError
+        If one is something else.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> require_numbers(SimpleNamespace(width="8"), "width", instead="a length in mm")
+    Traceback (most recent call last):
+    etendue.errors.ArgumentError: SimpleNamespace: width is '8'; give a length in mm.
+    """
+    for name in names:
+        given = getattr(holder, name)
+        if not (none and given is None):
+            require_number(given, f"{type(holder).__name__}: {name}", f"{instead}, or None" if none else instead)
+
+
+def require_callable(given: object, what: str = "progress") -> None:
+    """Refuse what cannot be called; None is left alone.
+
+    Raises
+    ------
+    ArgumentError
+        If so.
+
+    Examples
+    --------
+    >>> require_callable(print), require_callable(None)
+    (None, None)
+    >>> require_callable(True)
+    Traceback (most recent call last):
+    etendue.errors.ArgumentError: progress is True; give a function that is called as work goes on, or None.
+    """
+    if given is not None and not callable(given):
+        raise ArgumentError(f"{what} is {described(given)}; give a function that is called as work goes on, or None.")
+
+
+def as_numbers(
+    given: Any, what: str, instead: str = "an array of numbers", dtype: type = np.float64, *, copy: bool = False
+) -> npt.NDArray[Any]:
+    """An array of numbers, of whatever shape.
+
+    Parameters
+    ----------
+    given : array_like
+        The argument.
+    what, instead : str
+        As of `require`.
+    dtype : type
+        Of the array.
+    copy : bool
+        Whether to copy an array that has this type already.
+
+    Raises
+    ------
+    ArgumentError
+        If it is a text, None, or holds something that is no number, or rows of different lengths.
+
+    Examples
+    --------
+    >>> as_numbers([1, 2], "RaySet: flux").tolist()
+    [1.0, 2.0]
+    >>> as_numbers([1, "b"], "RaySet: flux")
+    Traceback (most recent call last):
+    etendue.errors.ArgumentError: RaySet: flux is a list (could not convert string to float: 'b'); give an array of numbers.
+    """
+    why = ""
+    if not (given is None or isinstance(given, str | bytes | Mapping)):
+        try:
+            return np.array(given, dtype=dtype, copy=copy or None)
+        except (TypeError, ValueError, OverflowError) as error:
+            why = f" ({error})"
+    raise ArgumentError(f"{what} is {described(given)}{why}; give {instead}.") from None
+
+
+def as_point(given: Any, what: str, instead: str) -> tuple[float, float, float]:
+    """Three finite numbers.
+
+    Parameters
+    ----------
+    given : sequence of 3 numbers
+        The argument.
+    what, instead : str
+        As of `require`.
+
+    Raises
+    ------
+    ArgumentError
+        If it is something else.
+
+    Examples
+    --------
+    >>> as_point([0, 0, 5], "Observer: target", "three finite coordinates in mm")
+    (0.0, 0.0, 5.0)
+    >>> as_point((0, 5), "Observer: target", "three finite coordinates in mm")
+    Traceback (most recent call last):
+    etendue.errors.ArgumentError: Observer: target is (0, 5); give three finite coordinates in mm.
+    """
+    try:
+        found = () if isinstance(given, str | bytes | Mapping) else tuple(map(float, given))
+    except (TypeError, ValueError):
+        found = ()
+    if len(found) != 3 or not all(map(math.isfinite, found)):
+        told = (
+            f"({', '.join(f'{one:g}' for one in found[:4])}{', …' * (len(found) > 4)})" if found else described(given)
+        )
+        raise ArgumentError(f"{what} is {told}; give {instead}.")
+    x, y, z = found
+    return x, y, z

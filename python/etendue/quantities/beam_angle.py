@@ -148,6 +148,8 @@ def beam_angle(
         raise UnknownNameError("reference of a beam angle", reference, REFERENCES)
     if not math.isfinite(c):
         raise ArgumentError(f"beam_angle: the plane is C = {c}; give an angle in degrees.")
+    if about is not None:
+        require_number(about, "beam_angle: about", "0 or 180, the γ of the axis, or None")
     if about not in (None, 0.0, 180.0):
         raise ArgumentError(f"beam_angle: the axis is γ = {about}; give 0 or 180.")
     plane = float(np.mod(c, 360.0))

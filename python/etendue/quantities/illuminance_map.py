@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import as_point
 from etendue.quantities.observer import Screen
 from etendue.quantities.pixel_map import MapValues, PixelMap
 from etendue.quantities.provenance import Provenance
@@ -78,10 +79,9 @@ class IlluminanceMap(PixelMap):
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("centre", "right", "up"):
-            point = tuple(float(c) for c in getattr(self, name))
-            if len(point) != 3 or not np.isfinite(point).all():
-                raise ArgumentError(f"IlluminanceMap: {name} is {point}; give three finite numbers.")
-            object.__setattr__(self, name, point)
+            object.__setattr__(
+                self, name, as_point(getattr(self, name), f"IlluminanceMap: {name}", "three finite numbers")
+            )
         axes = np.array([self.right, self.up])
         if np.abs(axes @ axes.T - np.eye(2)).max() > ROUNDING:
             raise ArgumentError(f"IlluminanceMap: {self.right} and {self.up} are no unit vectors at right angles.")

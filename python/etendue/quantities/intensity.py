@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.quantities.angle_table import ROUNDING, gaps_of, hat_integrals, kinks_along, kinks_around
+from etendue.quantities.arguments import as_numbers, require, require_number
 from etendue.quantities.labelled import dataset
 from etendue.quantities.luminaire_facts import LUMINAIRE_FACTS, mirrored_facts, turned_facts
 from etendue.quantities.notebook import InNotebook
@@ -103,13 +104,14 @@ class Intensity(InNotebook):
     def __post_init__(self) -> None:
         if self.flux_unit not in FLUX_UNITS:
             raise UnknownNameError("flux unit", self.flux_unit, FLUX_UNITS)
+        require(self.luminaire, Mapping, "Intensity: luminaire", "facts by their names, as {'name': 'lamp'}")
         for fact in self.luminaire:
             if fact not in LUMINAIRE_FACTS:
                 raise UnknownNameError("fact about a luminaire", fact, LUMINAIRE_FACTS)
-        if np.ndim(self.standard_error) == 0:
-            object.__setattr__(self, "standard_error", np.full(np.shape(self.values), self.standard_error))
         for name in ("c", "gamma", "values", "standard_error"):
-            array = np.array(getattr(self, name), dtype=np.float64)
+            array = as_numbers(getattr(self, name), f"Intensity: {name}", copy=True)
+            if name == "standard_error" and array.ndim == 0:
+                array = np.full(self.values.shape, array)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         object.__setattr__(self, "luminaire", dict(self.luminaire))
@@ -411,6 +413,7 @@ class Intensity(InNotebook):
             [°], from +X towards +Y. Extents along x and y in `luminaire` change places for odd multiples of 90°. What is
             left to the nearest multiple stands in ``luminaire["extents_turned"]``, unless all that is known is round.
         """
+        require_number(angle, "Intensity: the angle to turn by", "a number of degrees")
         if not np.isfinite(angle):
             raise ArgumentError(f"Intensity: cannot be turned by {angle}°.")
         step = f"{TURNED} {angle:.9g}° about the axis"
@@ -447,7 +450,7 @@ class Intensity(InNotebook):
 
 
 def _finite(name: str, numbers: npt.ArrayLike) -> Array:
-    array = np.asarray(numbers, dtype=np.float64)
+    array = as_numbers(numbers, f"Intensity: {name}", "numbers")
     if not np.isfinite(array).all():
         raise ArgumentError(f"Intensity: {name} is not finite.")
     return array

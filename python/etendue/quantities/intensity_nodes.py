@@ -14,6 +14,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.quantities.angle_table import gaps_of, hat_integrals
+from etendue.quantities.arguments import require_number
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.provenance import Provenance
 from etendue.units import FluxUnit
@@ -258,6 +259,7 @@ def check_steps(c_planes: int | None, gamma_step: float | None) -> None:
     if gamma_step is None:
         steps = 0
     else:
+        require_number(gamma_step, "gamma_step", "an angle above 0° and up to 90°")
         if not (math.isfinite(gamma_step) and 0.0 < gamma_step <= 90.0):
             raise ArgumentError(f"gamma_step is {gamma_step:g}°; give an angle above 0° and up to 90°.")
         steps = round(180.0 / gamma_step)

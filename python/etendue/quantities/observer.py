@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.quantities.arguments import require_number
+from etendue.quantities.arguments import as_point, require_numbers
 
 Plane = Literal["view", "xy"]
 PLANES: tuple[Plane, ...] = get_args(Plane)
@@ -71,18 +71,15 @@ class Observer:
     roll: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("theta", "phi", "distance", "roll"):
-            unit = "a length in mm" if name == "distance" else "an angle in °"
-            require_number(getattr(self, name), f"Observer: {name}", unit)
+        require_numbers(self, "theta", "phi", "roll", instead="an angle in °")
+        require_numbers(self, "distance", instead="a length in mm")
         if not 0.0 <= self.theta <= 180.0:
             raise ArgumentError(f"Observer: theta is {self.theta:g}°; give 0° to 180°, measured from +Z.")
         if not math.isfinite(self.phi):
             raise ArgumentError(f"Observer: phi is {self.phi:g}°; give a finite azimuth.")
         if not (math.isfinite(self.distance) and self.distance > 0.0):
             raise ArgumentError(f"Observer: distance is {self.distance:g} mm; give a finite distance above 0.")
-        target = tuple(float(c) for c in self.target)
-        if len(target) != 3 or not all(map(math.isfinite, target)):
-            raise ArgumentError(f"Observer: target is {_told(target)}; give three finite coordinates in mm.")
+        target = as_point(self.target, "Observer: target", "three finite coordinates in mm")
         object.__setattr__(self, "target", target)
         if not math.isfinite(self.roll):
             raise ArgumentError(f"Observer: roll is {self.roll:g}°; give a finite angle.")
@@ -90,11 +87,10 @@ class Observer:
             self._check_up(self.up)
 
     def _check_up(self, up: tuple[float, ...]) -> None:
-        upright = tuple(float(c) for c in up)
-        if len(upright) != 3 or not all(map(math.isfinite, upright)) or not any(upright):
-            raise ArgumentError(
-                f"Observer: up is {_told(upright)}; give a direction as three finite numbers, not all 0."
-            )
+        wanted = "a direction as three finite numbers, not all 0"
+        upright = as_point(up, "Observer: up", wanted)
+        if not any(upright):
+            raise ArgumentError(f"Observer: up is {_told(upright)}; give {wanted}.")
         object.__setattr__(self, "up", upright)
         along = np.linalg.norm(np.cross(_unit(upright), self.direction))
         if along < ALONG_THE_LINE:
@@ -202,8 +198,7 @@ class Screen:
     plane: Plane = "view"
 
     def __post_init__(self) -> None:
-        for name in ("width", "height", "columns", "rows"):
-            require_number(getattr(self, name), f"Screen: {name}", "a number")
+        require_numbers(self, "width", "height", "columns", "rows")
         for name in ("width", "height"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.arguments import as_numbers, require
 from etendue.quantities.labelled import dataset
 from etendue.quantities.notebook import InNotebook
 from etendue.quantities.observer import Screen
@@ -74,13 +75,14 @@ class PixelMap(InNotebook, GoesOut, abc.ABC):
     def __post_init__(self) -> None:
         if self.flux_unit not in FLUX_UNITS:
             raise UnknownNameError("flux unit", self.flux_unit, FLUX_UNITS)
+        kind = type(self).__name__
+        require(self.screen, Screen, f"{kind}: screen", "an et.Screen(width, height, columns, rows)")
         for name, dtype in (("values", np.float64), ("standard_error", np.float64), ("rays", np.int64)):
             with np.errstate(invalid="ignore"):  # signalling NaN of damaged files
-                array = np.array(getattr(self, name), dtype=dtype)
+                array = as_numbers(getattr(self, name), f"{kind}: {name}", dtype=dtype, copy=True)
             if array.shape != self.screen.shape:
                 raise ArgumentError(
-                    f"{type(self).__name__}: {name} has shape {array.shape}, the screen has (rows, columns) = "
-                    f"{self.screen.shape}."
+                    f"{kind}: {name} has shape {array.shape}, the screen has (rows, columns) = {self.screen.shape}."
                 )
             array.setflags(write=False)
             object.__setattr__(self, name, array)

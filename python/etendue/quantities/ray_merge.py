@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import as_numbers, require
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_operations import with_total_flux
 from etendue.quantities.ray_records import RayRecords
@@ -24,6 +25,9 @@ from etendue.units import FluxUnit
 
 def merged(sets: Sequence[Rays], flux: Sequence[float] | None, unit: FluxUnit | None) -> Rays:
     """One set of all usable rays; see `etendue.RaySet.merge`."""
+    require(sets, Sequence, "merge: sets", "ray sets in a list, of files et.read_rays(path)")
+    for one in sets:
+        require(one, RayRecords, "merge: one of the sets", "rays, of a file et.read_rays(path)")
     if not sets:
         raise ArgumentError("merge: no ray sets.")
     if unit is None and len({rays.flux_unit for rays in sets}) > 1:
@@ -34,6 +38,7 @@ def merged(sets: Sequence[Rays], flux: Sequence[float] | None, unit: FluxUnit | 
     if not all(rays.has_position for rays in sets):
         raise ArgumentError("merge: a far-field set has no positions.")
     if flux is not None:
+        flux = as_numbers(flux, "merge: flux", "one flux for each set").ravel().tolist()
         if len(flux) != len(sets):
             raise ArgumentError(f"merge: {len(flux)} fluxes for {len(sets)} sets.")
         sets = [with_total_flux(rays, value, unit) for rays, value in zip(sets, flux, strict=True)]

@@ -5,12 +5,14 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import math
+import numbers
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from etendue import _core
 from etendue.errors import ArgumentError, UnitError, UnknownNameError
+from etendue.quantities.arguments import require, require_number
 from etendue.quantities.ray_records import FLUX_COLUMNS, RayRecords
 from etendue.quantities.ray_rewriting import CHUNK, Rays, Records, transformed, with_records, without
 from etendue.quantities.ray_stream import FloatArray
@@ -42,6 +44,7 @@ class VirtualFocus:
 def subset(rays: Rays, n: int, seed: int) -> Rays:
     """`n` rays drawn at random without replacement, in file order, rescaled to the total flux of the whole set."""
     total = len(rays)
+    require(n, numbers.Integral, "subset: n", "a whole number of rays")
     if not 1 <= n <= total:
         raise ArgumentError(f"subset: {n} rays of {total:,}; ask for 1 to {total:,}.")
     _check_seed(seed)
@@ -64,6 +67,7 @@ def subset(rays: Rays, n: int, seed: int) -> Rays:
 
 def thin(rays: Rays, parts: int, seed: int) -> tuple[Rays, ...]:
     """Deal the rays at random into independent parts, each scaled by `parts` to stand for the whole."""
+    require(parts, numbers.Integral, "thin: parts", "a whole number, 2 or more")
     if not 2 <= parts < 2**32:
         raise ArgumentError(f"thin: {parts} parts; ask for 2 to 4294967295.")
     _check_seed(seed)
@@ -88,6 +92,7 @@ def thin(rays: Rays, parts: int, seed: int) -> tuple[Rays, ...]:
 
 def with_total_flux(rays: Rays, flux: float, unit: FluxUnit | None = None) -> Rays:
     """The same rays sharing a total flux, in proportion to what they carry now. See `etendue.RaySet.with_total_flux`."""
+    require_number(flux, "total flux", "a finite flux > 0")
     if not (math.isfinite(flux) and flux > 0):
         raise ArgumentError(f"total flux {flux}; give a finite flux > 0.")
     unit = unit or rays.flux_unit
@@ -124,6 +129,7 @@ def with_total_flux(rays: Rays, flux: float, unit: FluxUnit | None = None) -> Ra
 
 def scaled(rays: Rays, factor: float) -> Rays:
     """Positions multiplied by `factor` (> 0); directions and flux stay, so luminance falls by its square."""
+    require_number(factor, "scale factor", "a finite factor > 0")
     if not (math.isfinite(factor) and factor > 0):
         raise ArgumentError(f"scale factor {factor}; give a finite factor > 0.")
     meaning = rays.meaning
@@ -205,6 +211,7 @@ def virtual_focus(rays: RayRecords) -> VirtualFocus:
 
 
 def _check_seed(seed: int) -> None:
+    require(seed, numbers.Integral, "seed", "a whole number from 0 to 2^64 - 1")
     if not 0 <= seed < 2**64:
         raise ArgumentError(f"seed {seed}; give 0 to 2^64 - 1.")
 

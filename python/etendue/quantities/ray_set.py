@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.quantities import ray_colours, ray_merge, ray_operations, ray_units
+from etendue.quantities.arguments import as_numbers, require
 from etendue.quantities.notebook import InNotebook
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_records import RayRecords, RaySetMeaning
@@ -64,7 +65,7 @@ class RaySet(RayRecords, InNotebook):
         columns = {"position": position, "direction": direction, "flux": flux}
         if wavelength is not None:
             columns["wavelength"] = wavelength
-        arrays = {name: np.asarray(value, dtype=np.float64) for name, value in columns.items()}
+        arrays = {name: as_numbers(value, f"RaySet: {name}") for name, value in columns.items()}
         n = arrays["flux"].size
         for name, array in arrays.items():
             expected = (n, 3) if name in ("position", "direction") else (n,)
@@ -73,6 +74,9 @@ class RaySet(RayRecords, InNotebook):
         records = np.zeros(n, dtype=[(name, "<f8", array.shape[1:]) for name, array in arrays.items()])
         for name, array in arrays.items():
             records[name] = array
+        require(spectra, Sequence, "RaySet: spectra", "a sequence of et.Spectrum")
+        for one in spectra:
+            require(one, Spectrum, "RaySet: one of the spectra", "an et.Spectrum(wavelength, weight)")
         meaning = RaySetMeaning(flux_unit=flux_unit, spectra=tuple(spectra), provenance=provenance or Provenance())
         self._adopt(records, meaning)
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import as_numbers
 from etendue.units import LUMINOUS_EFFICACY_MAX, FluxUnit
 
 FloatArray = npt.NDArray[np.float64]
@@ -50,8 +51,8 @@ class Spectrum:
     weight: FloatArray
 
     def __post_init__(self) -> None:
-        wavelength = np.array(self.wavelength, dtype=np.float64)
-        weight = np.array(self.weight, dtype=np.float64)
+        wavelength = as_numbers(self.wavelength, "Spectrum: wavelength", copy=True)
+        weight = as_numbers(self.weight, "Spectrum: weight", copy=True)
         if wavelength.ndim != 1 or wavelength.shape != weight.shape or wavelength.size == 0:
             raise ArgumentError(
                 f"Spectrum: {wavelength.shape} wavelengths and {weight.shape} weights; give two equally long rows."

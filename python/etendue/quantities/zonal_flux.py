@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.quantities.angle_table import gaps_of, hat_integrals, kinks_along, kinks_around
-from etendue.quantities.arguments import INTENSITY, described, require
+from etendue.quantities.arguments import INTENSITY, as_numbers, require
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.intensity_nodes import NEIGHBOURS
 from etendue.quantities.node_errors import known_errors, shared_around
@@ -51,10 +51,7 @@ def zonal_flux(intensity: Intensity, edges: npt.ArrayLike) -> tuple[Array, Array
     [0.25, 0.5, 0.25]
     """
     require(intensity, Intensity, "zonal_flux: intensity", INTENSITY)
-    try:
-        wanted = np.asarray(edges, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"zonal_flux: edges is {described(edges)}; give two or more angles γ that rise.") from None
+    wanted = as_numbers(edges, "zonal_flux: edges", "two or more angles γ that rise")
     if wanted.ndim != 1 or wanted.size < 2 or not (np.isfinite(wanted).all() and (np.diff(wanted) > 0.0).all()):
         raise ArgumentError("zonal_flux: give at least two angles γ that rise.")
     if wanted[0] < 0.0 or wanted[-1] > 180.0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-import operator
+import numbers
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import as_numbers, require
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
@@ -65,9 +66,7 @@ class RingSource(DrawnRays):
     Raises
     ------
     ArgumentError
-        If a parameter is out of its domain.
-    TypeError
-        If a number of rays, runs or the seed is no integer.
+        If a parameter is out of its domain, or a number of rays, runs or the seed is no integer.
 
     Examples
     --------
@@ -86,15 +85,21 @@ class RingSource(DrawnRays):
         runs: int = 1,
         seed: int = 1,
     ) -> None:
-        edges = (0.0, *map(float, radii))
-        if len(edges) < 2 or any(not b > a or not math.isfinite(b) for a, b in itertools.pairwise(edges)):
-            raise ArgumentError(f"RingSource: radii {tuple(radii)} mm; give rising radii > 0.")
-        if len(flux) != len(radii) or any(not (math.isfinite(f) and f > 0) for f in flux):
+        outer = as_numbers(radii, "RingSource: radii", "rising radii in mm")
+        edges = (0.0, *np.ravel(outer).tolist())
+        rising = all(b > a and math.isfinite(b) for a, b in itertools.pairwise(edges))
+        if outer.ndim != 1 or len(edges) < 2 or not rising:
+            raise ArgumentError(f"RingSource: radii {edges[1:]} mm; give rising radii > 0.")
+        given_flux = as_numbers(flux, "RingSource: flux", "one flux in lm for each ring")
+        flux = tuple(np.ravel(given_flux).tolist())
+        if given_flux.shape != outer.shape or any(not (math.isfinite(f) and f > 0) for f in flux):
             raise ArgumentError(
-                f"RingSource: flux {tuple(flux)} lm; give one finite flux > 0 for each of {len(radii)} rings."
+                f"RingSource: flux {flux} lm; give one finite flux > 0 for each of {len(edges) - 1} rings."
             )
-        # Python's own TypeError for 1e6, which would become a share of rays with a fraction.
-        rays, runs, seed = map(operator.index, (rays, runs, seed))
+        # Not 1e6, which would become a share of rays with a fraction.
+        for name, given in (("rays", rays), ("runs", runs), ("seed", seed)):
+            require(given, numbers.Integral, f"RingSource: {name}", "a whole number, without a point or an exponent")
+        rays, runs, seed = int(rays), int(runs), int(seed)
         if rays < 1 or runs < 1 or rays * runs >= 2**63:
             raise ArgumentError(
                 f"RingSource: {rays} rays in {runs} runs; give at least one, and fewer than 2^63 in all."
@@ -102,7 +107,7 @@ class RingSource(DrawnRays):
         if not 0 <= seed < 2**64:
             raise ArgumentError(f"RingSource: seed {seed}; give 0 to 2^64 - 1.")
         self.edges = edges
-        self.ring_flux = tuple(map(float, flux))
+        self.ring_flux = flux
         self.runs = runs
         self.seed = seed
         self.allocation = allocate_rays(rays, [f * a for f, a in zip(flux, self.ring_area, strict=True)])

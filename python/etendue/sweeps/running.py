@@ -15,6 +15,7 @@ from etendue.luminance.framing import framed_screens
 from etendue.luminance.methods import PathTracing
 from etendue.luminance.regions import AnyRegion
 from etendue.luminance.scene_map import Fits, with_fields
+from etendue.quantities.arguments import require, require_callable
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import Progress, checked_threads
@@ -110,6 +111,7 @@ def sweep(
     >>> table["absorbed:wall"].round(9).tolist(), table.unit("lamp.flux")
     ([50.0, 100.0, 200.0], 'lm')
     """
+    require_callable(progress)
     table = None
     steps = sweep_steps(
         scene,
@@ -175,6 +177,7 @@ def sweep_steps(
     places = [Parameter.find(base, path, flux_unit) for path in axes]
     _refuse_twice(places)
     looked = _Looking(observer, screen, base)
+    require(measure, (str, Sequence), "sweep: measure", "a name such as 'luminance', or several in a list")
     names = [measure] if isinstance(measure, str) else list(measure)
     detectors = [detector.name or f"detectors[{i}]" for i, detector in enumerate(base.detectors)]
     measures = measures_of(names, detectors, looked.names)
@@ -369,6 +372,7 @@ def _named(observers: Sequence[Observer]) -> dict[str, Observer]:
     """Observers by their angles, and by their number where these are the same."""
     found: dict[str, Observer] = {}
     for number, one in enumerate(observers):
+        require(one, Observer, "sweep: observer", "an et.Observer(theta, phi, distance), or several in a list")
         name = f"{one.theta:g},{one.phi:g}"
         found[name if name not in found else f"{name} ({number})"] = one
     return found
@@ -382,6 +386,7 @@ def _axes(parameters: Mapping[str, Values]) -> dict[str, list[float]]:
     ArgumentError
         If there are none, or too many.
     """
+    require(parameters, Mapping, "sweep: parameters", "a dict of rows of values, as {'lens.at.2': [5, 6, 7]}")
     if not parameters:
         raise ArgumentError("sweep: give at least one parameter with its values, e.g. {'lens.at.2': [5, 6, 7]}.")
     axes: dict[str, list[float]] = {}

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from etendue.description.values import is_number
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import require, require_callable
 from etendue.quantities.ray_stream import Progress, checked_threads
 from etendue.scene import Scene
 from etendue.tracing.ledger import NOTEWORTHY, TraceWarning
@@ -87,6 +88,7 @@ def trace(
     >>> bool(abs(seen.mean - 1) < 4 * seen.standard_error[0, 0])      # 1 cd at 1 m
     True
     """
+    require_callable(progress)
     result = None
     for result in trace_rounds(scene, rays, seed, until=until, most_events=most_events, threads=threads, resume=resume):
         if progress is not None:
@@ -138,6 +140,7 @@ def trace_rounds(
         raise ArgumentError(f"until is {until!r}; give the relative error to be reached, e.g. 0.01.")
     start = None
     if resume is not None:
+        require(resume, (TraceResult, str, os.PathLike), "resume", "a TraceResult, or the path of one")
         start = resume if isinstance(resume, TraceResult) else TraceResult.load(Path(resume))
     before = None if start is None else start.plan
     if rays is None and start is not None:

@@ -210,6 +210,7 @@ def format_named(name: str) -> RayFormat:
     >>> format_named("OpticStudio").name
     'zemax'
     """
+    require(name, str, "format", "the name of a format of ray files, or None")
     wanted = name.strip().lower()
     for candidate in RAY_FORMATS:
         if candidate.name.lower() == OTHER_NAMES.get(wanted, wanted):

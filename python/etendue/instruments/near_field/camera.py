@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import require_numbers
 
 Array = npt.NDArray[np.float64]
 Counts = npt.NDArray[np.uint16]
@@ -80,6 +81,7 @@ class Camera:
     threshold: float = 5.0
 
     def __post_init__(self) -> None:
+        require_numbers(self, *(one.name for one in dataclasses.fields(self)))
         for name, least, most in (("pixels", 8, 8192), ("bits", 4, 16), ("exposures", 1, MOST_EXPOSURES)):
             value = getattr(self, name)
             if not (least <= value <= most and int(value) == value):

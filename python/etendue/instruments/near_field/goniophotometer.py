@@ -19,6 +19,7 @@ from etendue.instruments.near_field.merging import stretches
 from etendue.instruments.near_field.positions import ArmPositions
 from etendue.instruments.near_field.run import NearFieldRun
 from etendue.instruments.near_field.setting import Setting, counts_dtype
+from etendue.quantities.arguments import as_point, require_callable, require_number, require_numbers
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import checked_seed
 from etendue.quantities.spool import Spool
@@ -106,7 +107,11 @@ class NearFieldGoniophotometer:
         return f"NearFieldGoniophotometer({', '.join(f'{f.name}={getattr(self, f.name)!r}' for f in stated)})"
 
     def __post_init__(self) -> None:
-        for name in ("distance", "field_of_view", "photometer_distance"):
+        stated = ("distance", "field_of_view", "photometer_distance")
+        require_numbers(self, *stated, instead="a length in mm", none=True)
+        require_numbers(self, "camera_pixels", "exposures", "bits", "full_well", "read_noise", "blur", "exposure_ratio")
+        require_numbers(self, "level", "exposure_error", "threshold", "photometer_error", "arm_error")
+        for name in stated:
             value = getattr(self, name)
             if value is not None and not 0.0 < value < math.inf:
                 raise ArgumentError(f"{name} is {value} mm; give a length above 0.")
@@ -116,8 +121,8 @@ class NearFieldGoniophotometer:
                 raise ArgumentError(f"{name} is {value}; give a standard deviation from 0 on, and a small one.")
         for name in ("centre", "misalignment"):
             value = getattr(self, name)
-            if value is not None and (np.shape(value) != (3,) or not np.isfinite(value).all()):
-                raise ArgumentError(f"{name} is {value}; give three finite coordinates in mm.")
+            if value is not None:
+                as_point(value, f"NearFieldGoniophotometer: {name}", "three finite coordinates in mm")
         self.camera, self.positions  # noqa: B018 - they refuse what they cannot be
 
     @property
@@ -139,7 +144,11 @@ class NearFieldGoniophotometer:
     @property
     def positions(self) -> ArmPositions:
         """Where the arm stops."""
-        gamma, c = self.step if isinstance(self.step, tuple) else (self.step, self.step)
+        wanted = "a number of degrees, or (step of γ, step of C)"
+        steps = self.step if isinstance(self.step, tuple) and len(self.step) == 2 else (self.step, self.step)
+        for step in steps:
+            require_number(step, "NearFieldGoniophotometer: step", wanted)
+        gamma, c = steps
         return ArmPositions(float(gamma), float(c))
 
     def measure(
@@ -181,6 +190,7 @@ class NearFieldGoniophotometer:
         FormatError, OSError, SceneError
             As the reading of a file.
         """
+        require_callable(progress)
         source = lamp_of(lamp, samples, size, checked_seed(seed), threads)
         setting, around = self._setting(source)
         workers = threads or os.cpu_count() or 1

@@ -20,6 +20,7 @@ from etendue.luminance.looking import look_at_field
 from etendue.luminance.methods import PathTracing
 from etendue.luminance.opening import open_source
 from etendue.luminance.scene_map import SeenScene, look_at_scene
+from etendue.quantities.arguments import require
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import RayStream
@@ -322,6 +323,7 @@ def lamp_of(
     >>> lamp_of(et.Scene(sources=[{"kind": "surface", "shape": {"kind": "disk", "radius": 3}, "flux": 10}])).flux_unit
     'lm'
     """
+    require(samples, (int, type(None)), "samples", "a whole number of lines of sight per pixel, or None")
     if samples is not None and not 1 <= samples <= 1 << 16:
         raise ArgumentError(f"{samples} lines of sight per pixel; give 1 to 65536.")
     if isinstance(source, str | os.PathLike):

@@ -23,6 +23,7 @@ from etendue.lightfield.gridded.sampling import RECORD, sampled_records
 from etendue.lightfield.gridded.summing import summed_intensity
 from etendue.lightfield.pilot_sample import check_near_field
 from etendue.lightfield.surfaces import Surface
+from etendue.quantities.arguments import SURFACE, require, require_callable, require_number
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.patches import Patches
 from etendue.quantities.powers_of_ten import counted
@@ -153,6 +154,9 @@ class GriddedSource:
         """
         if threshold is not None:
             check_threshold(threshold)
+        require(rays, RayStream, "GriddedSource.fit: rays", "rays, of a file et.read_rays(path)")
+        require(surface, Surface, "GriddedSource.fit: surface", SURFACE)
+        require_callable(progress)
         check_near_field(rays)
         batches = all_batches(rays, 2, progress)
         sequence = angular.sequence(coarsest_bins, finest_bins)
@@ -475,6 +479,7 @@ def check_threshold(threshold: float) -> None:
     --------
     >>> check_threshold(0.021)
     """
+    require_number(threshold, "threshold", "the largest flux error of a patch in percent, 0 or more")
     if not (math.isfinite(threshold) and threshold >= 0.0):
         raise ArgumentError(
             f"threshold is {threshold!r}; give the largest flux error of a patch in percent, 0 or more."

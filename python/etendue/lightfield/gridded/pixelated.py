@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import operator
+import numbers
 from collections.abc import Iterator
 from typing import Literal
 
@@ -14,6 +14,7 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.lightfield.gridded.curved_pixels import CylindricalPixels, SphericalPixels
 from etendue.lightfield.gridded.pixels import SLACK, Array, Cells, Indices, Pixelation, SquarePixels, flat_size
 from etendue.lightfield.surfaces import FLAT, Part, Surface
+from etendue.quantities.arguments import require, require_number
 
 CentreOn = Literal["auto", "corner", "pixel"]
 CENTRES: tuple[CentreOn, ...] = ("auto", "corner", "pixel")
@@ -85,6 +86,7 @@ class PixelatedSurface:
         ArgumentError
             If a size is out of its domain, or there would be too many pixels.
         """
+        require_number(pixel, "pixel", "the side of a pixel in mm, above 0")
         if not (math.isfinite(pixel) and pixel > 0.0):
             raise ArgumentError(f"pixel is {pixel!r}; give the side of a pixel in mm, above 0.")
         if centre_on not in CENTRES:
@@ -95,7 +97,8 @@ class PixelatedSurface:
                 f"pixels lie on surfaces without focus and frames, and {surface.told} has them; state it without."
             )
         if parallels is not None:
-            parallels = operator.index(parallels)
+            require(parallels, numbers.Integral, "parallels", "a whole number, 1 or more, or None")
+            parallels = int(parallels)
             if parallels < 1:
                 raise ArgumentError(f"parallels is {parallels}; give 1 or more.")
             if not any(part.shape == "hemisphere" for part in parts):
