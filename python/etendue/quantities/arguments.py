@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Mapping
-from typing import Any
-
-import numpy as np
-import numpy.typing as npt
+from typing import TYPE_CHECKING, Any
 
 from etendue.errors import ArgumentError
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
 INTENSITY = "an Intensity: of a file et.read_intensity(path), of rays et.intensity_distribution(rays)"
 """What to give where an intensity distribution is wanted."""
@@ -157,7 +157,7 @@ def require_callable(given: object, what: str = "progress") -> None:
 
 
 def as_numbers(
-    given: Any, what: str, instead: str = "an array of numbers", dtype: type = np.float64, *, copy: bool = False
+    given: Any, what: str, instead: str = "an array of numbers", dtype: type = float, *, copy: bool = False
 ) -> npt.NDArray[Any]:
     """An array of numbers, of whatever shape.
 
@@ -185,8 +185,10 @@ def as_numbers(
     Traceback (most recent call last):
     etendue.errors.ArgumentError: RaySet: flux is a list (could not convert string to float: 'b'); give an array of numbers.
     """
+    import numpy as np  # noqa: PLC0415 - the command line names wrong paths without it
+
     why = ""
-    if not (given is None or isinstance(given, str | bytes | Mapping)):
+    if not (given is None or isinstance(given, (str, bytes))):  # numpy makes NaN of None, and a number of "3"
         try:
             return np.array(given, dtype=dtype, copy=copy or None)
         except (TypeError, ValueError, OverflowError) as error:
