@@ -88,7 +88,7 @@ def make_thumbnail(name: str) -> None:
         (picture,) = Path(folder).rglob("*.png")
         image = Image.open(picture).convert("RGB")
         size = (WIDTH, round(image.height * WIDTH / image.width))
-        image.resize(size, Image.Resampling.LANCZOS).quantize(128).save(FIGURES / SHOWN[name], optimize=True)
+        image.resize(size, Image.Resampling.LANCZOS).quantize(256, kmeans=3).save(FIGURES / SHOWN[name], optimize=True)
 
 
 if __name__ == "__main__":
