@@ -171,6 +171,12 @@ CALLS: dict[str, tuple[Callable[[Any], object], tuple[Any, ...]]] = {
         (3, et.Observer(0, 0, 1000)),
     ),
     "sweep: parameters": (lambda wrong: et.sweep(et.Scene(), wrong, "flux"), (None, "lamp.flux", ["lamp.flux"])),
+    "sweep: measure": (lambda wrong: et.sweep(LAMP, {"lamp.flux": [1, 2]}, wrong), (None, 3)),
+    "sweep: one of the measures": (lambda wrong: et.sweep(LAMP, {"lamp.flux": [1, 2]}, wrong), ([3], ["flux", None])),
+    "sweep: observer": (
+        lambda wrong: et.sweep(LAMP, {"lamp.flux": [1, 2]}, "flux", wrong, et.Screen(8, 8, 4, 4)),
+        (3, "front", [LMAP]),
+    ),
     "resume is": (
         lambda wrong: et.trace(et.Scene(sources=[{"kind": "point", "flux": 1}]), 10, resume=wrong),
         (3, LMAP, [1]),

@@ -179,6 +179,8 @@ def sweep_steps(
     looked = _Looking(observer, screen, base)
     require(measure, (str, Sequence), "sweep: measure", "a name such as 'luminance', or several in a list")
     names = [measure] if isinstance(measure, str) else list(measure)
+    for name in names:
+        require(name, str, "sweep: one of the measures", "a name such as 'luminance'")
     detectors = [detector.name or f"detectors[{i}]" for i, detector in enumerate(base.detectors)]
     measures = measures_of(names, detectors, looked.names)
     how = PathTracing(rays_per_pixel=rays_per_pixel, seed=seed)
@@ -336,6 +338,8 @@ class _Looking:
             raise ArgumentError(
                 "screen: of which observer? Give one, or leave it out: those of the scene have their own."
             )
+        wanted = "an et.Observer(theta, phi, distance), or several in a list"
+        require(observer, (Observer, Sequence, type(None)), "sweep: observer", wanted)
         stated = [observer] if isinstance(observer, Observer) else None if observer is None else list(observer)
         self._stated = None if stated is None else _named(stated)
         self._screen = screen
