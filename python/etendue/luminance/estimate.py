@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, TypedDict, Unpack, cast, overload
 
-from etendue.quantities.arguments import require_callable
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.lightfield.light_field import LightField
@@ -19,6 +18,7 @@ from etendue.luminance.methods import AnyMethod, Cone, FromField, MethodName, Pa
 from etendue.luminance.opening import open_source
 from etendue.luminance.scatter_map import look_at_events
 from etendue.luminance.scene_map import look_at_scene
+from etendue.quantities.arguments import require_callable
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.memory import require_memory
 from etendue.quantities.observer import Observer, Screen

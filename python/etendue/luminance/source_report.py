@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-from etendue.quantities.arguments import require
 from etendue.errors import ArgumentError
 from etendue.formats.rays import read_rays
 from etendue.formats.rays.facts import fact_rows, ray_facts
@@ -20,6 +19,7 @@ from etendue.lightfield.light_field import LightField
 from etendue.lightfield.surfaces import Surface
 from etendue.luminance.estimate import luminance_map
 from etendue.luminance.framing import centre_of_light, framed, light_towards, probe
+from etendue.quantities.arguments import require
 from etendue.quantities.data_sheet import DataSheet, data_sheet
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
@@ -192,7 +192,9 @@ def report_source(
     rays = source if isinstance(source, RaySet) else read_rays(source)
     name = rays.provenance.source if isinstance(source, RaySet) else str(source)
     if observers is not None:
-        require(observers, Sequence, "report_source: observers", "et.Observer(theta, phi, distance) in a sequence, or None")
+        require(
+            observers, Sequence, "report_source: observers", "et.Observer(theta, phi, distance) in a sequence, or None"
+        )
         for one in observers:
             require(one, Observer, "report_source: one of the observers", "an et.Observer(theta, phi, distance)")
     if observers is not None and not observers:
