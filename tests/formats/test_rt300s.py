@@ -77,5 +77,5 @@ def test_damage_is_told(samples: Path, tmp_path: Path) -> None:
     broken.write_bytes(data[: len(data) // 3])
     with pytest.raises(FormatError, match="damaged"):
         et.read_scans([broken])
-    with pytest.raises(FormatError, match="below 0"):
-        et.read_scans([whole])
+    # Noise about nothing is no damage.
+    assert (et.read_scans([whole]).values < 0.0).any()

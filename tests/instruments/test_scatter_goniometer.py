@@ -154,10 +154,10 @@ def test_detectors_beyond_the_sample_measure_nothing() -> None:
         assert scan.bsdf * math.pi == pytest.approx(np.full(5, share), rel=1e-2)
 
 
-def test_noise_below_zero_is_no_table() -> None:
+def test_noise_below_zero_stays_in_scans() -> None:
     scan = GoniometerScan([-10.0, 0.0, 10.0], [0.1, -0.02, 0.1], solid_angle=1e-3)
-    with pytest.raises(ArgumentError, match=r"at 0° the BSDF is -20, below 0 as noise"):
-        scan.scans()
+    assert scan.scans().values[1] == pytest.approx(-20.0)
+    assert repr(scan.scans()).endswith("1 below 0)")
     with pytest.raises(ArgumentError, match="incidence is 120°"):
         GoniometerScan([0.0], [1.0], incidence=120.0)
 

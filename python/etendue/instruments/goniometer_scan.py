@@ -235,19 +235,15 @@ class GoniometerScan:
     def scans(self) -> Scans:
         """The same as values at pairs of directions, for `Bsdf.from_scans`; light comes from azimuth 180°.
 
+        Values below 0, as noise about a dark level has them, stay: see there.
+
         Raises
         ------
         ArgumentError
-            If it is a scan without a sample, the solid angle is not known, or a value is below 0.
+            If it is a scan without a sample, or the solid angle is not known.
         """
         if not self.sample:
             raise ArgumentError("scans for tables are of light that a sample scatters; this one is of the beam alone")
-        if (self.bsdf < 0.0).any():
-            at = int(np.argmin(self.bsdf))
-            raise ArgumentError(
-                f"at {self.angle[at]:g}° the BSDF is {self.bsdf[at]:.3g}, below 0 as noise about a dark level may be: "
-                "tables and models take none below 0. Count longer there, or take the mean of neighbouring positions"
-            )
         incident = np.tile(light_from(self.incidence, 180.0), (self.angle.size, 1))
         scattered = detector_directions(self.angle, self.incidence, self.plane, behind=self.way == "transmitted")
         return Scans(incident, scattered, self.bsdf, self.bsdf_error)

@@ -91,10 +91,12 @@ class Bsdf(abc.ABC):
         Parameters
         ----------
         scans : Scans
-            Of all incidences, as `read_scans` reads them.
+            Of all incidences, as `read_scans` reads them. Values below 0, as noise about a dark level has them, count in the
+            share of the light, and a note tells how many they are and what they do to it; f of the table is nowhere below 0.
         method : {"specular-centred", "direction-cosines", "natural-neighbours", "radial-basis", "shepard", "smooth"}
             The way from the measured directions to a grid; or "automatic": the first of these for scans through the
             specular direction, another where there are none, and a note among the complaints of the table says so.
+            "radial-basis" takes logarithms, and no values below 0.
 
         Returns
         -------

@@ -224,8 +224,9 @@ def fit_bsdf(scans: Scans, model: str) -> BsdfFit:
     UnknownNameError
         If there is no such model.
     ArgumentError
-        If there are too few values, all are 0, a standard error is 0, the scans do not determine the parameters, the fitted
-        model reflects more light than arrives, or a reflectance is stated, which is for tables.
+        If there are too few values, all are 0, a standard error is 0, a value is below 0 and no errors are known, the scans
+        do not determine the parameters, the fitted model reflects more light than arrives, or a reflectance is stated, which
+        is for tables.
     MissingLibraryError
         If SciPy is not installed.
 
@@ -256,6 +257,12 @@ def fit_bsdf(scans: Scans, model: str) -> BsdfFit:
     if scans.standard_error is not None and not (scans.standard_error > 0.0).all():
         at = int(np.argmin(scans.standard_error))
         raise ArgumentError(f"standard_error[{at}] is 0: state how far each value may be off, or leave all errors out")
+    if scans.standard_error is None and (below := int((scans.values < 0.0).sum())):
+        raise ArgumentError(
+            f"{below} of {scans.values.size} values are below 0, as noise about a dark level may be, and without standard "
+            "errors residuals count relative to f, which would prefer low values: state how far each value may be off "
+            "(standard_error), or make a table of the scans (Bsdf.from_scans), which takes such values"
+        )
     first, _, second = model.partition("+")
     form = _Form(LOBE_MODELS.get(second or first), FLOOR in (first, second))
     # |β − β₀|: β₀ is the projection of the specular direction, −i.

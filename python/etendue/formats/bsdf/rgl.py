@@ -14,6 +14,7 @@ import numpy.typing as npt
 from etendue.errors import FormatError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat
 from etendue.formats.bsdf.functions import sampled
+from etendue.formats.bsdf.points import below_zero
 from etendue.formats.bsdf.tokens import ADVICE, LARGEST
 from etendue.quantities.bsdf_data import BsdfData
 from etendue.quantities.report import Complaint
@@ -82,7 +83,7 @@ def read(path: Path) -> BsdfData:
         isotropic=isotropic,
         mirrored=False,
         name=name or path.stem,
-        complaints=(Complaint("note", "values", said), Complaint("note", "grid", note)),
+        complaints=(Complaint("note", "values", said), Complaint("note", "grid", note), *below_zero(values)),
     )
 
 

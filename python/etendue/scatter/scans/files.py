@@ -35,7 +35,7 @@ def read_scans(
     transmittance: float | None = None,
     blank: str | os.PathLike[str] | None = None,
 ) -> Scans:
-    r"""Read scans from files, all of one sample.
+    r"""Read scans from files, all of one sample. Values below 0, as noise about a dark level has them, stay as they are.
 
     Parameters
     ----------
@@ -101,11 +101,6 @@ def read_scans(
             i, s = incident_direction(stages[2], stages[3]), detector_direction(*stages)
             f = bsdf_of_flux(columns["flux"], arriving, solid_angle=solid_angle, direction=s)
             error = None if error is None else bsdf_of_flux(error, arriving, solid_angle=solid_angle, direction=s)
-        if (f < 0.0).any():
-            at = int(np.argmin(f))
-            raise FormatError(
-                Path(path), f"row {at + 1}", f"a value of {f[at]:g}", "A BSDF is not below 0: subtract less."
-            )
         incident.append(i)
         scattered.append(s)
         values.append(f)
@@ -187,8 +182,4 @@ def _workbook(path: Path, blank: Path | None) -> tuple[Array, Array, Array]:
     scattered = direction(np.abs(receive), azimuth + np.where(receive < 0.0, 270.0, 90.0))
     lit = np.einsum("ij,ij->i", incident, scattered) < np.cos(np.radians(SHADOW))
     f = signal / (np.pi * np.abs(scattered[:, 2]))
-    if (f[lit] < 0.0).any():
-        at = int(np.flatnonzero(lit & (f < 0.0))[0])
-        place = f"azimuth {azimuth[at]:g}°, incidence {incidence[at]:g}°, receive {receive[at]:g}°"
-        raise FormatError(path, place, f"a value of {f[at]:g}", "A BSDF is not below 0: subtract less.")
     return incident[lit], scattered[lit], f[lit]

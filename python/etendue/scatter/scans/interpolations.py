@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -11,11 +10,13 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.extras import require
+from etendue.formats.bsdf.points import below_zero
 from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
 from etendue.quantities.report import Complaint
 from etendue.scatter.scans import harvey_shack
 from etendue.scatter.scans.arms import AT_CENTRE, MOST_ARMS, ON_ARM, apart, arms_of, azimuths_of, beside
 from etendue.scatter.scans.scans import NEAR, SAME, Scans
+from etendue.scatter.scans.smoothing import require_light, smooth
 
 Array = npt.NDArray[np.float64]
 Interpolation = Callable[[Array, Array, Array, Array], tuple[Array, Array | None]]
@@ -32,9 +33,6 @@ TURNED = 0.1
 
 SMOOTHED = 2000
 """Values of an incidence up to which `smooth` is taken for scans: its time and memory grow with their square."""
-
-TESTED = 500
-"""Values that `smooth` finds its width by."""
 
 SPARSE = 5.0
 """Values on each azimuth that was measured, on average, below which they are none: by chance 72 azimuths hold a few each."""
@@ -93,22 +91,19 @@ def radial_basis(incident: Array, measured: Array, values: Array, wanted: Array)
     Raises
     ------
     ArgumentError
-        If no value is above 0.
+        If no value is above 0, or one is below.
     MissingLibraryError
         Without SciPy.
     """
-    _require_light(values)
+    require_light(values)
+    if (values < 0.0).any():
+        raise ArgumentError(f"{(values < 0.0).sum()} of {values.size} values are below 0, and have no logarithm")
     # A direction that was measured several times counts once.
     points, own = np.unique(np.round(_planar(incident, measured), 9), axis=0, return_inverse=True)
     mean = np.bincount(own.ravel(), values) / np.bincount(own.ravel())
     logs = np.log(np.maximum(mean, 1e-3 * values[values > 0.0].min()))
     surface = require("scipy.interpolate").RBFInterpolator(points, logs, kernel="linear")
     return np.asarray(np.exp(np.minimum(surface(_planar(incident, wanted)), np.log(values.max())))), None
-
-
-def _require_light(values: Array) -> None:
-    if not (values > 0.0).any():
-        raise ArgumentError("no value is above 0, and this method takes logarithms")
 
 
 def shepard(incident: Array, measured: Array, values: Array, wanted: Array) -> tuple[Array, None]:
@@ -218,69 +213,6 @@ def horizon(incident: Array, azimuth: float) -> float:
     return float(np.degrees(np.arctan2(incident[2], -slope)))
 
 
-def smooth(incident: Array, measured: Array, values: Array, wanted: Array) -> tuple[Array, Array]:
-    """Local lines through ln f over the logarithmic distance from the specular direction, with errors.
-
-    The width along the distance is that which predicts each value best from all others; along the azimuth it bridges the
-    largest gap between the scans. The standard error is that by which the others miss a value, averaged in the same way: of
-    the shape between the scans, and of the noise of one value, which is more than that of their mean.
-
-    Logarithms of noisy values are too low on average, and zeros have none. So what is found is multiplied by the mean of the
-    measured values over the mean of what is found where they were measured, with the same weights: not by the mean of their
-    ratios, which has no bound where values are decades above what is found.
-    """
-    _require_light(values)
-    least = max(0.5 * float(values[values > 0.0].min()), 1e-300)
-    logs = np.log(np.maximum(values, least))
-    planes = [harvey_shack.coordinates(incident, one) for one in (measured, wanted)]
-    scale = max(float(np.quantile(planes[0][0][planes[0][0] > 0.0], 0.25)), SMALLEST)
-    (x, a), (at_x, at_a) = ((np.arcsinh(r / scale), azimuth) for r, azimuth in planes)
-    steps = np.sort(a[planes[0][0] > scale])
-    gap = float(np.diff(np.append(steps, steps[0] + 360.0)).max()) if steps.size > 1 else 360.0
-    turn = max(0.5 * gap, 5.0)
-
-    def weights(at_x: Array, at_a: Array, width: float) -> Array:
-        # Azimuths mean the less, the closer to the specular direction.
-        part = -np.expm1(-0.5 * (at_x[:, None] * x) / (0.25 * width + 1e-12))
-        log = -0.5 * ((at_x[:, None] - x) / width) ** 2
-        log -= 0.5 * (part * ((at_a[:, None] - a + 180.0) % 360.0 - 180.0) / turn) ** 2
-        return np.asarray(log)
-
-    def line(log: Array, at_x: Array, width: float) -> tuple[Array, Array]:
-        w = np.exp(log - log.max(axis=1, keepdims=True))
-        w /= w.sum(axis=1, keepdims=True)
-        mean = w @ x
-        spread = w @ (x * x) - mean**2 + (0.05 * width) ** 2
-        slope = ((w * (x - mean[:, None])) @ logs) / spread
-        return w @ logs + slope * (at_x - mean), w
-
-    def missed_by_others(chosen: npt.NDArray[np.intp], width: float) -> Array | None:
-        """What the others miss of some of the values; None if one has no others near it."""
-        log = weights(x[chosen], a[chosen], width)
-        log[np.arange(chosen.size), chosen] = -np.inf
-        if not np.isfinite(log.max(axis=1)).all():
-            return None
-        return np.asarray(logs[chosen] - line(log, x[chosen], width)[0])
-
-    every = np.arange(x.size)
-    tested = every[:: math.ceil(x.size / TESTED)]
-    best = None
-    for width in np.geomspace(0.03, 1.5, 14):
-        trial = missed_by_others(tested, float(width))
-        score = math.inf if trial is None else float(np.mean(trial**2))
-        if math.isfinite(score) and (best is None or score < best[0]):
-            best = (score, float(width))
-    missed = None if best is None else missed_by_others(every, best[1])
-    if best is None or missed is None:
-        raise ArgumentError("too few values to smooth")
-    width = best[1]
-    there, _ = line(weights(x, a, width), x, width)
-    smoothed = np.exp(np.minimum(there, logs.max()))
-    found, w = line(weights(at_x, at_a, width), at_x, width)
-    f = np.exp(np.minimum(found, logs.max()))
-    return f * (w @ values) / (w @ smoothed), f * np.sqrt(w @ missed**2)
-
-
 METHODS: dict[str, Interpolation] = {
     "specular-centred": specular_centred,
     "direction-cosines": direction_cosines,
@@ -366,6 +298,8 @@ def _workable(scans: Scans) -> list[str]:
         if not (scans.values[own] > 0.0).any():
             for name in LOGARITHMIC:
                 found.pop(name, None)
+        if (scans.values[own] < 0.0).any():
+            found.pop("radial-basis", None)
     return list(found)
 
 
@@ -385,7 +319,8 @@ def tabulated(scans: Scans, method: str = AUTOMATIC, smallest: float = SMALLEST)
     -------
     BsdfData
         Isotropic if all light comes from one azimuth; the fact "interpolation" says how it was made. Scaled to
-        `scans.reflectance` and `scans.transmittance` where these are known; `stated` is the share before. With standard
+        `scans.reflectance` and `scans.transmittance` where these are known; `stated` is the share before. Values below 0
+        count in it, with a note; so the noise of dark samples does not become light. With standard
         errors where the scans have some and the method is linear, or finds its own (`smooth`).
 
     Raises
@@ -424,7 +359,9 @@ def tabulated(scans: Scans, method: str = AUTOMATIC, smallest: float = SMALLEST)
         told = f"method {own}" + (" for transmitted light" if transmitted else "")
         complaints += [Complaint("note", told, why)] if why else []
         methods += [own] if own not in methods else []
-        slices += _slices(way, own, radial_coordinates(smallest), turns, transmitted=transmitted)
+        below = _BelowZero()
+        slices += _slices(way, own, radial_coordinates(smallest), turns, below, transmitted=transmitted)
+        complaints += below.told(way.values, f"{'transmitted' if transmitted else 'reflected'} light")
     return BsdfData(
         tuple(slices),
         isotropic=len(turns) <= 1,
@@ -435,8 +372,29 @@ def tabulated(scans: Scans, method: str = AUTOMATIC, smallest: float = SMALLEST)
     )
 
 
+class _BelowZero:
+    """What values below 0 do to the shares: at the incidence where it is most."""
+
+    def __init__(self) -> None:
+        self.most: tuple[float, float, float] | None = None
+
+    def note(self, theta: float, share: float, lifted: float) -> None:
+        """The share at an incidence, and what it would be if values below 0 were 0."""
+        if self.most is None or lifted - share > self.most[2] - self.most[1]:
+            self.most = theta, share, lifted
+
+    def told(self, values: Array, place: str) -> list[Complaint]:
+        """How many they are, and their light."""
+        found = below_zero(values, place)
+        if self.most is not None:
+            theta, share, lifted = self.most
+            more = f": at {theta:.3g}° of incidence it is {share:.4g}, and would be {lifted:.4g} if they were 0"
+            found = [dataclasses.replace(one, found=one.found + more) for one in found]
+        return found
+
+
 def _slices(
-    scans: Scans, method: str, radial: Array, turns: Sequence[float], *, transmitted: bool
+    scans: Scans, method: str, radial: Array, turns: Sequence[float], below: _BelowZero, *, transmitted: bool
 ) -> Iterator[BsdfSlice]:
     """A slice for each incidence of what is reflected, or of the mirror image of what is transmitted."""
     for measured, own in scans.by_incidence():
@@ -461,13 +419,21 @@ def _slices(
             together, _ = METHODS[method](incident, scans.scattered[own], of_values, at[there])
             error = together if error is None else np.maximum(error, together)
         values, errors = np.full(grid.shape, np.nan), None
-        values[there] = np.maximum(f, 0.0)
+        # Without noise below 0 there is but rounding.
+        negative = (scans.values[own] < 0.0).any()
+        values[there] = f if negative else np.maximum(f, 0.0)
         if error is not None:
             errors = np.full(grid.shape, np.nan)
             errors[there] = error
         # The same grid of direction cosines, on the side where the light leaves.
         one = BsdfSlice(incident, values, transmitted, grid=grid)
         share = one.integral()
+        if negative:
+            lifted = values.copy()
+            lifted[there], _ = METHODS[method](
+                incident, scans.scattered[own], np.maximum(scans.values[own], 0.0), at[there]
+            )
+            below.note(one.theta, share, dataclasses.replace(one, values=lifted).integral())
         factor = 1.0
         if scans.reflectance is not None:
             if not share > 0.0:

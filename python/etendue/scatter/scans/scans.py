@@ -32,7 +32,7 @@ class Scans:
         Unit vectors away from the surface, +z the normal: to where the light comes from, and to the detector, which is
         behind the sample (z < 0) for transmitted light.
     values : array, shape (n,)
-        f [1/sr].
+        f [1/sr]. Noise below 0, as dark samples have it, belongs to them: without it their mean would be too large.
     standard_error : array, shape (n,), optional
         Of the values [1/sr].
     reflectance, transmittance : float, optional
@@ -42,7 +42,7 @@ class Scans:
     ------
     ArgumentError
         If shapes do not fit, a direction is no unit vector, light comes from behind the sample or leaves along it, a value
-        or a standard error is not finite or below 0, or a share is stated of light of which there is no value.
+        is not finite, a standard error is not or is below 0, or a share is stated of light of which there is no value.
 
     Examples
     --------
@@ -74,8 +74,8 @@ class Scans:
                 raise ArgumentError(
                     f"{name}[{at}] is {getattr(self, name)[at].tolist()}, no unit vector {where} the sample"
                 )
-        if not (np.isfinite(self.values) & (self.values >= 0.0)).all():
-            raise ArgumentError("measured values are finite and not below 0")
+        if not np.isfinite(self.values).all():
+            raise ArgumentError("measured values are finite")
         if self.standard_error is not None:
             if self.standard_error.shape != n:
                 raise ArgumentError("standard errors have the shape of the values")
@@ -203,7 +203,9 @@ class Scans:
         thetas = self.thetas
         angles = f"{min(thetas):.3g} to {max(thetas):.3g}°"
         known = "with errors" if self.standard_error is not None else "without errors"
-        return f"Scans({self.values.size} values at {len(thetas)} incidences, {angles}, {known})"
+        below = int((self.values < 0.0).sum())
+        dark = f", {below} below 0" if below else ""
+        return f"Scans({self.values.size} values at {len(thetas)} incidences, {angles}, {known}{dark})"
 
     @property
     def thetas(self) -> list[float]:
