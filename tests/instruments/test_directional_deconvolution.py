@@ -407,3 +407,19 @@ def test_steep_lobes_are_0_far_outside(name: str) -> None:
     model = LOBE_MODELS[name]
     values = model.shape(np.array([0.0, 1e10, 1e20]), np.array([6.0 for _ in model.extra]))
     assert values.tolist() == [1.0, 0.0, 0.0]
+
+
+@pytest.mark.slow
+def test_a_scan_without_noise_is_taken_as_one_of_unknown_noise() -> None:
+    """Quadratures have standard errors of rounding, which are no counts; the Gaussian of 6 /sr comes back all the same."""
+    goniometer = et.ScatterGoniometer()
+    sample = et.bsdf.Gaussian(peak=6, sigma=0.08)
+    scan = goniometer.measure_window(sample, 30, step=2.5, span=20, method="quadrature")
+    assert scan.standard_error is not None
+    assert 0.0 < scan.standard_error.max() < 1e-12 * scan.flux.max()
+    found = et.deconvolve_directions(scan, replicates=0)
+    unknown = et.deconvolve_directions(dataclasses.replace(scan, standard_error=None), replicates=0)
+    assert found.peak == unknown.peak
+    assert found.peak == pytest.approx(6.0, rel=0.02)
+    with pytest.raises(et.errors.ArgumentError, match="needs the standard errors"):
+        et.deconvolve_directions(scan, stop="held-out", replicates=0)

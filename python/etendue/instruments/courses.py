@@ -26,6 +26,9 @@ FURTHEST = 1000
 
 LARGEST_ITERATIONS = 1_000_000
 
+NOISELESS = 1e-8
+"""Standard errors over the largest flux up to which they are rounding: a position would have counted 10¹⁶."""
+
 
 def rule_of(stop: str | int | None, *, counted: bool) -> str:
     """The name of a rule, or a number of iterations as text; the default where nothing is said.
@@ -54,6 +57,17 @@ def rule_of(stop: str | int | None, *, counted: bool) -> str:
     if not counted and stop in NEEDS_COUNTS:
         raise ArgumentError(f"the rule {stop!r} needs the standard errors of the scan; 'thesis' and 'plateau' do not")
     return stop
+
+
+def is_noisy(flux: Array, error: Array | None) -> bool:
+    """Whether standard errors tell what a count stands for: not those of rounding, which quadratures have.
+
+    Examples
+    --------
+    >>> is_noisy(np.array([3.0, 1.0]), np.array([0.1, 0.1])), is_noisy(np.array([3.0, 1.0]), np.array([1e-16, 0.0]))
+    (True, False)
+    """
+    return error is not None and bool((error > NOISELESS * np.abs(flux).max()).any())
 
 
 def halves_of(measured: Array, gain: float, seed: int) -> tuple[Array, Array]:
