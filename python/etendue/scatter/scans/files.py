@@ -35,7 +35,9 @@ def read_scans(
     transmittance: float | None = None,
     blank: str | os.PathLike[str] | None = None,
 ) -> Scans:
-    r"""Read scans from files, all of one sample. Values below 0, as noise about a dark level has them, stay as they are.
+    r"""Read scans from files, all of one sample.
+
+    Values below 0, as noise about a dark level has them, stay as they are.
 
     Parameters
     ----------

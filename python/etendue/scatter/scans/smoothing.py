@@ -48,6 +48,33 @@ def smooth(incident: Array, measured: Array, values: Array, wanted: Array) -> tu
 
     So values below 0, as noise about a dark level has them, count in that mean, and f is below 0 where it is. Of logarithms
     what lies below that noise has no meaning, and counts as large as it.
+
+    Parameters
+    ----------
+    incident : array, shape (3,)
+        Unit vector to where the light comes from.
+    measured, wanted : array, shape (n, 3), (m, 3)
+        Unit vectors of the measured and of the wanted directions.
+    values : array, shape (n,)
+        Measured f [1/sr].
+
+    Returns
+    -------
+    array, array
+        f and its standard error at the wanted directions [1/sr], shape (m,).
+
+    Raises
+    ------
+    ArgumentError
+        If no value is above 0, or they are too few.
+
+    Examples
+    --------
+    >>> angle = np.radians(np.arange(-80.0, 81.0, 5.0))
+    >>> to = np.column_stack([np.sin(angle), 0.0 * angle, np.cos(angle)])
+    >>> f, _ = smooth(np.array([0.0, 0.0, 1.0]), to, np.tile([0.3, -0.1], 17)[:33], to[:2])
+    >>> bool((np.abs(f - 0.1) < 0.05).all())
+    True
     """
     require_light(values)
     least = max(0.5 * float(values[values > 0.0].min()), _noise(values), 1e-300)
