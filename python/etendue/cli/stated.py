@@ -22,14 +22,17 @@ class Verb(TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         """As of the parser."""
-        _stated.set(
+        before = _stated.set(
             {
                 parameter.name: _spelled(parameter, ctx.params.get(parameter.name))
                 for parameter in self.params
                 if getattr(ctx.get_parameter_source(parameter.name), "name", None) == STATED
             }
         )
-        return super().invoke(ctx)
+        try:
+            return super().invoke(ctx)
+        finally:
+            _stated.reset(before)
 
 
 def _spelled(parameter: Any, value: object) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.extras import scipy_part
-from etendue.instruments.courses import FURTHEST, after, course_of, is_noisy
+from etendue.instruments.courses import FURTHEST, after, course_of
 from etendue.instruments.directional_operator import ForwardModel
 from etendue.instruments.directional_scan import DirectionalScan
 from etendue.instruments.stopping import Course
@@ -107,7 +107,7 @@ def flux_per_count(scan: DirectionalScan) -> Array | None:
 
     Where the flux is too small to tell, as in the middle of all positions.
     """
-    if scan.standard_error is None or not is_noisy(scan.flux, scan.standard_error):
+    if scan.standard_error is None or not (scan.standard_error > 0.0).any():
         return None
     whole = scan.flux + scan.background
     sure = (whole > SURE * scan.standard_error) & (scan.standard_error > 0.0)

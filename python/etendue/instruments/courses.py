@@ -26,8 +26,8 @@ FURTHEST = 1000
 
 LARGEST_ITERATIONS = 1_000_000
 
-NOISELESS = 1e-8
-"""Standard errors over the largest flux up to which they are rounding: a position would have counted 10¹⁶."""
+MOST_COUNTS = 2.0**53
+"""At a position that can be parted: more have errors of rounding, as quadratures do, and go together in lots."""
 
 
 def rule_of(stop: str | int | None, *, counted: bool) -> str:
@@ -59,26 +59,17 @@ def rule_of(stop: str | int | None, *, counted: bool) -> str:
     return stop
 
 
-def is_noisy(flux: Array, error: Array | None) -> bool:
-    """Whether standard errors tell what a count stands for: not those of rounding, which quadratures have.
-
-    Examples
-    --------
-    >>> is_noisy(np.array([3.0, 1.0]), np.array([0.1, 0.1])), is_noisy(np.array([3.0, 1.0]), np.array([1e-16, 0.0]))
-    (True, False)
-    """
-    return error is not None and bool((error > NOISELESS * np.abs(flux).max()).any())
-
-
 def halves_of(measured: Array, gain: float, seed: int) -> tuple[Array, Array]:
     """Counts parted into halves at random, four times: one half as fluxes of the whole, the other half as counts.
 
     Both of shape (n, 4).
     """
     rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 0))))
-    counts = np.round(np.maximum(measured, 0.0) / gain).astype(np.int64)
+    wanted = np.maximum(measured, 0.0) / gain
+    lot = max(1.0, float(wanted.max()) / MOST_COUNTS)
+    counts = np.round(wanted / lot).astype(np.int64)
     first = rng.binomial(counts[:, None], 0.5, (counts.size, THINNINGS))
-    return np.asarray(2.0 * gain * first), (counts[:, None] - first).astype(np.float64)
+    return np.asarray(2.0 * gain * lot * first), np.asarray(lot * (counts[:, None] - first), dtype=np.float64)
 
 
 def course_of(

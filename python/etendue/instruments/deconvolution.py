@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.output import atomic_output
-from etendue.instruments.courses import after, course_of, is_noisy, rule_of
+from etendue.instruments.courses import after, course_of, rule_of
 from etendue.instruments.goniometer_scan import GoniometerScan, full_width, summit, total_scatter
 from etendue.instruments.operators import Operator, OperatorName, folded, middle_of, operator_of, sparse_if_large
 from etendue.instruments.penalised_lobe import PenalisedLobe, penalised_lobe
@@ -307,7 +307,7 @@ def _without_gaps(scan: GoniometerScan) -> GoniometerScan:
 
 def _gain(scan: GoniometerScan) -> float | None:
     """The flux that one count stands for: the variance of a count is itself."""
-    if scan.standard_error is None or not is_noisy(scan.flux, scan.standard_error):
+    if scan.standard_error is None or not (scan.standard_error > 0.0).any():
         return None
     total = float(np.sum(np.maximum(scan.flux + scan.background, 0.0)))
     return float(np.sum(scan.standard_error**2)) / total if total > 0.0 else None

@@ -234,7 +234,7 @@ def compare(
 
     Examples
     --------
-    >>> from etendue.quantities.observer import Observer
+    >>> from etendue.quantities.observer import Observer, Screen
     >>> from etendue.quantities.provenance import Provenance
     >>> def lmap(*values):
     ...     return LuminanceMap([values], [[1.0] * 4], [[9] * 4], Observer(0, 0, 1000), Screen(4, 1, 4, 1),
@@ -444,7 +444,7 @@ def cross_section(lmap: LuminanceMap, *, x: float | None = None, y: float | None
 
     Examples
     --------
-    >>> from etendue.quantities.observer import Observer
+    >>> from etendue.quantities.observer import Observer, Screen
     >>> from etendue.quantities.provenance import Provenance
     >>> lmap = LuminanceMap([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], np.ones((2, 3)), np.ones((2, 3)), Observer(0, 0, 1000),
     ...                     Screen(3, 4, 3, 2), provenance=Provenance(software="example"))
