@@ -332,6 +332,6 @@ def test_cross_section_off_the_screen(where: dict[str, float]) -> None:
 )
 def test_what_is_no_map_of_luminance_is_refused(ask: Callable[[Any], object]) -> None:
     desk = IlluminanceMap([[400.0, 600.0]], [[4.0, 5.0]], [[900, 1100]], Screen(2000, 1000, 2, 1, "xy"))
-    for wrong, name in ((desk, "IlluminanceMap"), ("map.exr", "str")):
-        with pytest.raises(ArgumentError, match=f"a {name} is no map of luminance; give"):
+    for wrong, name in ((desk, "an IlluminanceMap"), ("map.exr", "'map.exr'")):
+        with pytest.raises(ArgumentError, match=f"the map is {name}; give a LuminanceMap"):
             ask(wrong)

@@ -108,11 +108,16 @@ def light_towards(rays: RaySet, observer: Observer, screen: Screen) -> Light:
     cone = next((a for a in CONES if (cosine > np.cos(np.radians(a))).sum() >= ENOUGH), CONES[-1])
     heading = cosine > np.cos(np.radians(cone))
     start, direction = start[heading] - np.asarray(observer.target), direction[heading]
-    slope = direction @ normal
-    crossing = start - ((start @ normal) / np.where(slope == 0.0, np.nan, slope))[:, None] * direction
+    crossing = _crossing(start, direction, normal)
     return Light(
         np.nan_to_num(crossing @ right, nan=np.inf), np.nan_to_num(crossing @ up, nan=np.inf), rays.flux[heading], cone
     )
+
+
+def _crossing(start: Array, direction: Array, normal: Array) -> Array:
+    """Where lines cross the plane through the origin with this normal, shape (n, 3) [mm]; NaN if they run along it."""
+    slope = direction @ normal
+    return np.asarray(start - ((start @ normal) / np.where(slope == 0.0, np.nan, slope))[:, None] * direction)
 
 
 def framed(rays: RaySet, observer: Observer, columns: int = 128, rows: int = 128) -> Screen:
@@ -251,8 +256,7 @@ def beyond_notes(rays: RaySet, observer: Observer, screen: Screen) -> tuple[str,
     """
     right, up, normal = screen.axes(observer)
     start, direction = rays.position - np.asarray(observer.target), rays.direction
-    slope = direction @ normal
-    crossing = start - ((start @ normal) / np.where(slope == 0.0, np.nan, slope))[:, None] * direction
+    crossing = _crossing(start, direction, normal)
     on_screen = (np.abs(crossing @ right) <= screen.width / 2) & (np.abs(crossing @ up) <= screen.height / 2)
     towards = observer.position - np.asarray(observer.target) - crossing
     cosine = np.einsum("ij,ij->i", towards, direction) / np.linalg.norm(towards, axis=1)

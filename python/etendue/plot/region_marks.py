@@ -144,7 +144,7 @@ def draw_outline(axes: Axes, corners: Array) -> None:
 
 
 def clipped(corners: Array, frame: tuple[float, float, float, float]) -> Array:
-    """The part of a polygon that lies in a rectangle: cut off side by side (Sutherland and Hodgman).
+    """The part of a polygon that lies in a rectangle: of all its parts, if there are several.
 
     Parameters
     ----------
@@ -163,14 +163,11 @@ def clipped(corners: Array, frame: tuple[float, float, float, float]) -> Array:
     >>> clipped(np.array([(0.0, 0), (4, 0), (0, 4)]), (1.0, 9.0, 1.0, 9.0)).tolist()
     [[1.0, 1.0], [3.0, 1.0], [1.0, 3.0]]
     """
+    from matplotlib.path import Path
+    from matplotlib.transforms import Bbox
+
     left, right, bottom, top = frame
-    for axis, sign, limit in ((0, 1.0, left), (0, -1.0, right), (1, 1.0, bottom), (1, -1.0, top)):
-        kept: list[Array] = []
-        for before, here in zip(np.roll(corners, 1, axis=0), corners, strict=True):
-            a, b = (sign * (float(end[axis]) - limit) for end in (before, here))
-            if (a < 0.0) != (b < 0.0):
-                kept.append(before + (here - before) * a / (a - b))
-            if b >= 0.0:
-                kept.append(here)
-        corners = np.array(kept).reshape(-1, 2)
-    return corners
+    closed = Path(np.concatenate([corners, corners[:1]]), closed=True)
+    parts = closed.clip_to_bbox(Bbox([(left, bottom), (right, top)])).to_polygons()
+    # The first corner stands at the end once more.
+    return np.concatenate([np.asarray(part)[:-1] for part in parts]) if parts else np.zeros((0, 2))

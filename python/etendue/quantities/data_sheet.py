@@ -126,7 +126,7 @@ def data_sheet(intensity: Intensity) -> DataSheet:
     """
     require(intensity, Intensity, "data_sheet: intensity", INTENSITY)
     planes = (0.0,) if intensity.symmetry() == "rotational" else (0.0, 90.0)
-    axes = (0.0, 180.0) if _two_beams(intensity) else (None,)
+    axes = (0.0, 180.0) if _shines_both_ways(intensity) else (None,)
     steps = np.arange(0.0, 180.1, 10.0)
     flux, error = zonal_flux(intensity, steps)
     down, total = zonal_flux(intensity, FLUX_CODE_ZONES)[0], intensity.flux
@@ -157,7 +157,7 @@ def data_sheet(intensity: Intensity) -> DataSheet:
     )
 
 
-def _two_beams(intensity: Intensity) -> bool:
+def _shines_both_ways(intensity: Intensity) -> bool:
     """Whether both sides of the horizon have a tenth of the peak, and the horizon less than half of what the darker has."""
     sides = [intensity.largest_between(*side).value for side in ((0.0, 90.0), (90.0, 180.0))]
     horizon = intensity.largest_between(90.0, 90.0).value

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError
+from etendue.quantities.arguments import require
 from etendue.quantities.observer import Observer, Screen, observer_from_dict, observer_to_dict
 from etendue.quantities.pixel_map import MapValues, PixelMap
 from etendue.quantities.provenance import Provenance
@@ -132,9 +132,6 @@ def check_luminance_map(given: object, asker: str) -> None:
     --------
     >>> check_luminance_map("map.exr", "compare")
     Traceback (most recent call last):
-    etendue.errors.ArgumentError: compare: a str is no map of luminance; give a LuminanceMap, of a file et.read_map(path).
+    etendue.errors.ArgumentError: compare: the map is 'map.exr'; give a LuminanceMap, of a file et.read_map(path).
     """
-    if not isinstance(given, LuminanceMap):
-        raise ArgumentError(
-            f"{asker}: a {type(given).__name__} is no map of luminance; give a LuminanceMap, of a file et.read_map(path)."
-        )
+    require(given, LuminanceMap, f"{asker}: the map", "a LuminanceMap, of a file et.read_map(path)")
