@@ -23,8 +23,8 @@ from typing import Any
 import etendue as et
 import numpy as np
 from etendue import _core
+from etendue.lightfield.carrier import Hemisphere, Plane, Surface
 from etendue.lightfield.light_field import LightField
-from etendue.lightfield.surfaces import Hemisphere, Plane, Surface
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from oracles.sources import DieUnderDome, LimbDarkenedDisk, PrismaticFilm

@@ -16,7 +16,7 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 from etendue.goniophotometry.threshold_sweep import threshold_sweep
-from etendue.lightfield.surfaces import Disk
+from etendue.lightfield.carrier import Disk
 from etendue.plot.threshold_picture import plot_threshold_sweep
 
 RADIUS, FLUX = 11.5, 1000.0

@@ -46,11 +46,7 @@ PUBLIC = {
     "etendue.instruments.near_field.run": ("NearFieldRun",),
     "etendue.instruments.revolved": ("revolved",),
     "etendue.instruments.scatter_goniometer": ("ScatterGoniometer",),
-    "etendue.lightfield.diagnostics": ("diagnose",),
-    "etendue.lightfield.fit_cache": ("cache_content", "clear_cache"),
-    "etendue.lightfield.gridded.gridded_source": ("GriddedSource",),
-    "etendue.lightfield.light_field": ("LightField",),
-    "etendue.lightfield.surfaces": (
+    "etendue.lightfield.carrier": (
         "Box",
         "Cylinder",
         "Disk",
@@ -60,6 +56,10 @@ PUBLIC = {
         "Sphere",
         "parse_surface",
     ),
+    "etendue.lightfield.diagnostics": ("diagnose",),
+    "etendue.lightfield.fit_cache": ("cache_content", "clear_cache"),
+    "etendue.lightfield.gridded.gridded_source": ("GriddedSource",),
+    "etendue.lightfield.light_field": ("LightField",),
     "etendue.luminance.combination": ("combine_maps",),
     "etendue.luminance.comparison": ("compare", "cross_section"),
     "etendue.luminance.denoising": ("denoise_map",),

@@ -32,11 +32,11 @@ from etendue.instruments.near_field.goniophotometer import NearFieldGoniophotome
 from etendue.instruments.near_field.run import NearFieldRun
 from etendue.instruments.revolved import revolved
 from etendue.instruments.scatter_goniometer import ScatterGoniometer
+from etendue.lightfield.carrier import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere, parse_surface
 from etendue.lightfield.diagnostics import diagnose
 from etendue.lightfield.fit_cache import cache_content, clear_cache
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.light_field import LightField
-from etendue.lightfield.surfaces import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere, parse_surface
 from etendue.luminance.combination import combine_maps
 from etendue.luminance.comparison import compare, cross_section
 from etendue.luminance.denoising import denoise_map

@@ -181,7 +181,7 @@ WITHOUT_EXAMPLE = {
     "etendue.lightfield.forecast": "diagnose is the door",
     "etendue.denoising": "smooth_counts shows what the others hold",
     "etendue.lightfield.storage": "LightField.save and load are the doors; docs/formats/light-fields.md reads a file",
-    "etendue.lightfield.surfaces.Surface": "what its kinds share; each has an example",
+    "etendue.lightfield.carrier.surface.Surface": "what its kinds share; each has an example",
     "etendue.lightfield.symmetry.proven_symmetry": "what LightField.fit does with symmetry='auto'",
     "etendue.lightfield.trees": "the optional Pólya tree over counts; docs/theory.md explains it",
     "etendue.formats.hdf5": "how files of light fields and of traces are written and read",

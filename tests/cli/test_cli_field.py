@@ -14,8 +14,8 @@ import pytest
 from etendue.cli import field as field_verbs
 from etendue.cli import fit as fit_verb
 from etendue.cli import sample as sample_verb
+from etendue.lightfield.carrier import Disk, Plane
 from etendue.lightfield.diagnostics import diagnose
-from etendue.lightfield.surfaces import Disk, Plane
 from oracles.light_fields import SURFACES, make_field
 from oracles.sources import LimbDarkenedDisk
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import etendue as et
 import pytest
 from etendue.cli.terminal import count
-from etendue.lightfield.surfaces import Disk
+from etendue.lightfield.carrier import Disk
 
 from cli.outcome import Run
 

@@ -18,9 +18,9 @@ import pytest
 from etendue.cli.verbs import VERBS
 from etendue.cli.wording import in_options
 from etendue.goniophotometry.far_field import intensity_distribution
+from etendue.lightfield.carrier import Surface, parse_surface
 from etendue.lightfield.fit_cache import FOLDER_VARIABLE, fit_or_recall
 from etendue.lightfield.gridded.gridded_source import GriddedSource
-from etendue.lightfield.surfaces import Surface, parse_surface
 from etendue.luminance.source_report import DISTANCE
 from etendue.plot.scene_layout import lay_out_scene
 from etendue.quantities.printable import printable

@@ -11,7 +11,7 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue import _core
-from etendue.lightfield.surfaces import Disk
+from etendue.lightfield.carrier import Disk
 from etendue.scene import compile_scene
 
 PROMPT = 1.0

@@ -134,6 +134,7 @@ def test_architecture_names_every_crate_and_module() -> None:
         "formats/bsdf",
         "scatter/models",
         "formats/intensity",
+        "lightfield/carrier",
         "scene/detectors",
         "cli",
         "plot",

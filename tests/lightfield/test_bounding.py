@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
+from etendue.lightfield.carrier import Box
 from etendue.lightfield.selection.bounding import (
     MISSED,
     ball_centre,
@@ -13,7 +14,6 @@ from etendue.lightfield.selection.bounding import (
     near_rays,
     start_centre,
 )
-from etendue.lightfield.surfaces import Box
 from oracles.bodies import Block, Body, Globe, Rod
 from scipy.optimize import minimize
 

@@ -15,6 +15,7 @@ import pytest
 from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.lightfield.candidate import Score
+from etendue.lightfield.carrier import Cylinder, Disk, Dome, Hemisphere, Plane, Surface
 from etendue.lightfield.characteristic import CharacteristicCurve, characteristic_curve
 from etendue.lightfield.diagnostics import diagnose
 from etendue.lightfield.etendue_density import FitReport, PartField
@@ -29,7 +30,6 @@ from etendue.lightfield.forecast import (
     make_forecast,
 )
 from etendue.lightfield.light_field import LightField
-from etendue.lightfield.surfaces import Cylinder, Disk, Dome, Hemisphere, Plane, Surface
 from etendue.plot.characteristic_picture import plot_characteristic
 from oracles.light_fields import SURFACES, make_field
 from oracles.sources import DieUnderDome, LimbDarkenedDisk

@@ -13,10 +13,10 @@ import numpy.typing as npt
 import pytest
 from etendue import _core
 from etendue.errors import ArgumentError
+from etendue.lightfield.carrier import Surface
 from etendue.lightfield.counting import PartGrids, count_rays
 from etendue.lightfield.field_rays import FieldRays
 from etendue.lightfield.light_field import LightField
-from etendue.lightfield.surfaces import Surface
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import BATCH
 from oracles.light_fields import SURFACES, make_field

@@ -11,10 +11,10 @@ import numpy.typing as npt
 import pytest
 from etendue import _core
 from etendue.errors import ArgumentError
+from etendue.lightfield.carrier import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere, Surface
 from etendue.lightfield.gridded import angular, fitting
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.gridded.pixelated import PixelatedSurface
-from etendue.lightfield.surfaces import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere, Surface
 from etendue.quantities.patches import AngularGrid, interpolated
 from oracles import gridded as thesis
 from oracles.sources import DieUnderDome, PrismaticFilm

@@ -6,8 +6,8 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError
+from etendue.lightfield.carrier import Disk
 from etendue.lightfield.gridded.gridded_source import GriddedSource
-from etendue.lightfield.surfaces import Disk
 from etendue.luminance.gridded_map import gridded_luminance_map
 from oracles.sources import PrismaticFilm
 

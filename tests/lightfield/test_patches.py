@@ -15,8 +15,8 @@ import pytest
 from etendue.cli import main
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats import patch_folder
+from etendue.lightfield.carrier import Disk, Dome
 from etendue.lightfield.gridded.gridded_source import GriddedSource
-from etendue.lightfield.surfaces import Disk, Dome
 from etendue.quantities.patches import Patches
 from oracles.sources import DieUnderDome
 

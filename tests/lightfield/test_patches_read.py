@@ -11,8 +11,8 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.errors import FormatError
+from etendue.lightfield.carrier import Cylinder, Disk, Dome, Surface
 from etendue.lightfield.gridded.gridded_source import GriddedSource
-from etendue.lightfield.surfaces import Cylinder, Disk, Dome, Surface
 
 DIGITS = 2e-5
 """Relative: what intensity files keep of a number."""

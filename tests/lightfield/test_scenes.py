@@ -13,8 +13,8 @@ import etendue as et
 import numpy as np
 import numpy.typing as npt
 import pytest
+from etendue.lightfield.carrier import Cylinder, Disk, Dome, Surface
 from etendue.lightfield.gridded.gridded_source import GriddedSource
-from etendue.lightfield.surfaces import Cylinder, Disk, Dome, Surface
 from etendue.units import RADIANCE_WHITE_EFFICACY
 from oracles.sources import DieUnderDome, PrismaticFilm
 

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError
+from etendue.lightfield.carrier import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere
 from etendue.lightfield.selection.scorer import SurfaceScorer
 from etendue.lightfield.selection.search import SurfaceChoice, choose_surface, told_apart
-from etendue.lightfield.surfaces import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere
 from etendue.quantities.report import RayFileWarning
 from oracles.bodies import Block, Globe, Rod
 from oracles.sources import DieUnderDome, LimbDarkenedDisk, PrismaticFilm, StructuredLed

@@ -11,8 +11,8 @@ import h5py
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError, FormatError, UnitError
+from etendue.lightfield.carrier import Disk
 from etendue.lightfield.light_field import LightField
-from etendue.lightfield.surfaces import Disk
 from etendue.luminance import scene_map
 from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum, photopic_efficiency

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from docs.pages import ROOT, blocks
 from etendue.errors import FormatError
-from etendue.lightfield import surfaces
+from etendue.lightfield import carrier
 from etendue.lightfield.etendue_density import FineErrors, PartField
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.storage import as_stored, is_field_file
@@ -74,7 +74,7 @@ def lines_across(field: LightField, n: int = 4000) -> tuple[Any, Any]:
 
 
 def test_every_surface_is_tried() -> None:
-    assert {type(surface) for surface in SURFACES.values()} == set(surfaces.SURFACES.values())
+    assert {type(surface) for surface in SURFACES.values()} == set(carrier.SURFACES.values())
 
 
 @EVERY

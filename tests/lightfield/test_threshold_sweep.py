@@ -18,8 +18,8 @@ from etendue.cli import main
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.goniophotometry.comparison import compare_intensities
 from etendue.goniophotometry.threshold_sweep import THRESHOLDS, UNIFORM, threshold_sweep
+from etendue.lightfield.carrier import Disk, Dome, Plane
 from etendue.lightfield.gridded.gridded_source import GriddedSource
-from etendue.lightfield.surfaces import Disk, Dome, Plane
 from etendue.plot.threshold_picture import plot_threshold_sweep
 from etendue.quantities.threshold_sweep import COLUMNS, ThresholdSweep
 from oracles.sources import DieUnderDome, PrismaticFilm

@@ -8,7 +8,7 @@ from typing import Any
 import etendue as et
 import pytest
 from etendue.errors import MemoryLimitError
-from etendue.lightfield.surfaces import Disk
+from etendue.lightfield.carrier import Disk
 from etendue.quantities import memory
 
 OBSERVER = et.Observer(10, 20, 300)

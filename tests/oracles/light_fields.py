@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from etendue.lightfield.carrier import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere, Surface
 from etendue.lightfield.etendue_density import FineErrors, FitReport, PartField
 from etendue.lightfield.light_field import LightField
-from etendue.lightfield.surfaces import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere, Surface
 from etendue.quantities.provenance import Provenance
 from etendue.units import FluxUnit
 

@@ -11,9 +11,9 @@ import typer
 from etendue.cli.convert import in_unit, with_flux
 from etendue.cli.terminal import say
 from etendue.formats.rays import read_rays
+from etendue.lightfield.carrier import Surface, parse_surface
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.storage import is_field_file
-from etendue.lightfield.surfaces import Surface, parse_surface
 from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectral_lines import SpectralLines

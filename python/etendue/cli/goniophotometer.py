@@ -17,7 +17,7 @@ from etendue.formats.rays import RAY_FORMATS, write_rays
 from etendue.instruments.near_field.goniophotometer import NearFieldGoniophotometer
 from etendue.instruments.near_field.run import NearFieldRun
 from etendue.instruments.near_field.storage import is_run_file
-from etendue.lightfield.surfaces import Surface, parse_surface
+from etendue.lightfield.carrier import Surface, parse_surface
 from etendue.plot import plot_near_field
 from etendue.quantities.measured import measured
 

@@ -16,9 +16,9 @@ from etendue.formats.patch_folder import PATCH_FORMATS, check_patch_folder
 from etendue.formats.rays import read_rays
 from etendue.formats.scenes import SCENES
 from etendue.goniophotometry.threshold_sweep import THRESHOLDS, threshold_sweep
+from etendue.lightfield.carrier import parse_surface
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.gridded.pixelated import CENTRES
-from etendue.lightfield.surfaces import parse_surface
 from etendue.plot.threshold_picture import plot_threshold_sweep
 
 

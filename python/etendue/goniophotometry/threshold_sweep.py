@@ -14,12 +14,12 @@ from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.goniophotometry.comparison import compare_intensities
 from etendue.goniophotometry.far_field import intensity_distribution
+from etendue.lightfield.carrier import Surface
 from etendue.lightfield.gridded import angular
 from etendue.lightfield.gridded.fitting import Batches, Bins, LitPixels, all_batches, fill_bins, lit_pixels, patches_of
 from etendue.lightfield.gridded.gridded_source import GriddedSource, check_threshold, pixels_for
 from etendue.lightfield.gridded.pixelated import CentreOn, PixelatedSurface
 from etendue.lightfield.gridded.sampling import RECORD
-from etendue.lightfield.surfaces import Surface
 from etendue.quantities.arguments import SURFACE, as_numbers, require, require_callable, require_number
 from etendue.quantities.intensity_nodes import check_steps
 from etendue.quantities.ray_records import RaySetMeaning
@@ -87,7 +87,7 @@ def threshold_sweep(
     Examples
     --------
     >>> import etendue as et
-    >>> from etendue.lightfield.surfaces import Disk
+    >>> from etendue.lightfield.carrier import Disk
     >>> sweep = threshold_sweep(et.RingSource(rays=100_000), Disk(radius=30), pixel=10, thresholds=(5, 0.5, 0.01))
     >>> bool(np.ptp(sweep["ncc"]) < 0.01), float(sweep["threshold"][sweep.best("score")])
     (True, 5.0)

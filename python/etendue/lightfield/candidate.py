@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from etendue import _core
+from etendue.lightfield.carrier import Part
 from etendue.lightfield.counting import EtendueCounts, FloatArray, Fold, PartCounts, Sums
 from etendue.lightfield.etendue_density import FineErrors, PartField, core_part
 from etendue.lightfield.marginals import scaled
 from etendue.lightfield.nodes import node_values
-from etendue.lightfield.surfaces import Part
 from etendue.lightfield.symmetry import order, sum_of_images
 from etendue.lightfield.trees import POSITIONS, Base, Position, Tree, even_positions, grow_averaged, log_evidence
 

@@ -93,7 +93,7 @@ def characteristic_curve(field: LightField, points: int = POINTS, *, threads: in
     Examples
     --------
     >>> import etendue as et
-    >>> from etendue.lightfield.surfaces import Disk
+    >>> from etendue.lightfield.carrier import Disk
     >>> field = LightField.fit(et.RingSource(rays=50_000), Disk(radius=30), depths=(4, 4, 2, 2))
     >>> curve = characteristic_curve(field, points=30_000)
     >>> round(curve.flux[-1]), round(curve.total_etendue)

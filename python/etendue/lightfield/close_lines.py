@@ -13,11 +13,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from etendue.concurrency import on_one_blas_thread
+from etendue.lightfield.carrier import Surface
 from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.etendue_density import EtendueDensity
 from etendue.lightfield.field_rays import FieldRays
 from etendue.lightfield.pilot_sample import pilot_sample
-from etendue.lightfield.surfaces import Surface
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
 
@@ -114,7 +114,7 @@ def told_of_blur(surface: Surface, ratio: FloatArray) -> Iterator[str]:
 
     Examples
     --------
-    >>> from etendue.lightfield.surfaces import Disk
+    >>> from etendue.lightfield.carrier import Disk
     >>> list(told_of_blur(Disk(radius=30), np.array([0.9, 1.1, 3.0, 1.0])))  # doctest: +ELLIPSIS
     ['lines that carry some 25% of the light pass each other 3 times as closely as this light field has them: ...']
     """

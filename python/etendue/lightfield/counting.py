@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError
+from etendue.lightfield.carrier import Surface
 from etendue.lightfield.pilot_sample import LOOKED_AT, even_density, pilot_sample
-from etendue.lightfield.surfaces import Surface
 from etendue.quantities.ray_stream import Progress, RayStream, Tally, checked_threads
 
 FloatArray = npt.NDArray[np.float64]

@@ -187,7 +187,7 @@ def diagnose(
     Examples
     --------
     >>> import etendue as et
-    >>> from etendue.lightfield.surfaces import Disk
+    >>> from etendue.lightfield.carrier import Disk
     >>> rays = et.RingSource(rays=20_000)
     >>> field = LightField.fit(rays, Disk(radius=30), depths=(4, 4, 2, 2))
     >>> diagnostics = diagnose(field, rays)

@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError, UnitError, UnknownNameError
+from etendue.lightfield.carrier import Surface
 from etendue.lightfield.counting import FloatArray
-from etendue.lightfield.surfaces import Surface
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import checked_threads
 from etendue.quantities.spectral_lines import SpectralLines

@@ -42,7 +42,7 @@ class FieldRays(DrawnRays):
     Examples
     --------
     >>> import etendue as et
-    >>> from etendue.lightfield.surfaces import Disk
+    >>> from etendue.lightfield.carrier import Disk
     >>> field = et.LightField.fit(et.RingSource(rays=100_000), Disk(radius=30), depths=(3, 3, 3, 3))
     >>> rays = FieldRays(field, 10**9, seed=4)
     >>> len(rays), round(rays.total_flux, 6), len(next(rays.batches()).flux)

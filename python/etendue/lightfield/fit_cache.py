@@ -24,10 +24,10 @@ import platformdirs
 
 from etendue import _core
 from etendue.errors import FormatError
+from etendue.lightfield.carrier import Surface
 from etendue.lightfield.fitting import notes_of_rays
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.storage import as_stored, save_field
-from etendue.lightfield.surfaces import Surface
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, checked_threads
 

@@ -25,6 +25,7 @@ from etendue.lightfield.candidate import (
     grow_candidates,
     score_densities,
 )
+from etendue.lightfield.carrier import Plane, Surface
 from etendue.lightfield.close_lines import TOLD, blurred_share, crowding, told_of_blur
 from etendue.lightfield.counting import Depths, EtendueCounts, FloatArray, PartGrids, count_rays
 from etendue.lightfield.etendue_density import EtendueDensity, FitReport
@@ -34,7 +35,6 @@ from etendue.lightfield.focusing import focused
 from etendue.lightfield.narrow_beams import told_of_narrow_beams
 from etendue.lightfield.pilot_sample import check_near_field, lit_rays, pilot_sample
 from etendue.lightfield.selection.search import choose_surface
-from etendue.lightfield.surfaces import Plane, Surface
 from etendue.lightfield.symmetry import fold, order, proven_symmetry, refutation
 from etendue.lightfield.trees import POSITIONS, holding_memory
 from etendue.quantities.arguments import SURFACE, require, require_callable, require_number

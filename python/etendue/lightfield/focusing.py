@@ -15,10 +15,13 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.denoising.fourier_plane import blur_matrix
+from etendue.lightfield.carrier import Plane, Sphere
+from etendue.lightfield.carrier.part import FLAT, Focus
+from etendue.lightfield.carrier.plane import MOST_FRAMES
+from etendue.lightfield.carrier.sizing import STRAY, hits_upwards
 from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.pilot_sample import even_density, pilot_sample, selected_rays
 from etendue.lightfield.selection.scorer import WITH_IMAGES, SurfaceScorer
-from etendue.lightfield.surfaces import FLAT, MOST_FRAMES, STRAY, Focus, Plane, Sphere, hits_upwards
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
 

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 from etendue.formats.input import as_path
+from etendue.lightfield.carrier import Surface
 from etendue.lightfield.etendue_density import EtendueDensity
 from etendue.lightfield.far_field import field_intensity
 from etendue.lightfield.field_rays import FieldRays
 from etendue.lightfield.fitting import fit_light_field
 from etendue.lightfield.resolution import Resolution, resolution
 from etendue.lightfield.storage import load_field, save_field
-from etendue.lightfield.surfaces import Surface
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.notebook import InNotebook
 from etendue.quantities.powers_of_ten import counted

@@ -25,10 +25,10 @@ from etendue.formats.other_kind import foreign
 from etendue.formats.output import atomic_output
 from etendue.formats.own_kind import LIGHT_FIELD
 from etendue.formats.strict_json import strict_json
+from etendue.lightfield.carrier import SURFACES, Part, Surface
 from etendue.lightfield.counting import MOST_CELLS
 from etendue.lightfield.etendue_density import EtendueDensity, FineErrors, FitReport, PartField
 from etendue.lightfield.rounding import digits_for, rounded
-from etendue.lightfield.surfaces import SURFACES, Part, Surface
 from etendue.lightfield.symmetry import SYMMETRIES
 from etendue.quantities.memory import require_memory
 from etendue.quantities.provenance import Provenance
@@ -261,7 +261,7 @@ def _surface(group: Node) -> Surface:
     kind = SURFACES[group.text("name")]
     hints = get_type_hints(kind)
     known = [f.name for f in dataclasses.fields(kind) if f.name in group.node.attrs]
-    sizes = kind.sizes()
+    sizes = kind.SIZES
     dimensions = {
         name: group.truth(name)
         if hints[name] is bool

@@ -7,10 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, TypedDict, Unpack, cast, overload
 
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.lightfield.carrier import Surface
 from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.pilot_sample import check_near_field
-from etendue.lightfield.surfaces import Surface
 from etendue.luminance.cone_map import look_through_cone
 from etendue.luminance.framing import beyond_notes, framed_screens, is_far, missed_notes, probe, shows_whole
 from etendue.luminance.looking import look_at_field

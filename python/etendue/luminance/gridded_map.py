@@ -48,7 +48,7 @@ def gridded_luminance_map(source: GriddedSource, observer: Observer, screen: Scr
     Examples
     --------
     >>> import etendue as et
-    >>> from etendue.lightfield.surfaces import Disk
+    >>> from etendue.lightfield.carrier import Disk
     >>> rings = et.RingSource(rays=400_000, seed=2)
     >>> grid = GriddedSource.fit(rings, Disk(radius=30), pixel=2, threshold=5)
     >>> lmap = gridded_luminance_map(grid, et.Observer(40, 0, 1000), et.Screen(8, 8, 1, 1))

@@ -14,8 +14,8 @@ from typing import Any, ClassVar, Literal, Self, get_args
 from etendue.description.values import is_number
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.rays.ray_index import RayIndex
+from etendue.lightfield.carrier import Surface
 from etendue.lightfield.light_field import LightField
-from etendue.lightfield.surfaces import Surface
 from etendue.quantities.ray_stream import RayStream, checked_seed
 from etendue.scene import Scene
 from etendue.scene.scatter_events import ScatterEvents

@@ -13,10 +13,10 @@ from typing import Any, Literal
 from etendue.errors import ArgumentError
 from etendue.formats.rays import read_rays
 from etendue.formats.rays.facts import fact_rows, ray_facts
+from etendue.lightfield.carrier import Surface
 from etendue.lightfield.diagnostics import Diagnostics, diagnose
 from etendue.lightfield.forecast import FEWEST_RAYS, REFITS
 from etendue.lightfield.light_field import LightField
-from etendue.lightfield.surfaces import Surface
 from etendue.luminance.estimate import luminance_map
 from etendue.luminance.framing import centre_of_light, framed, light_towards, probe
 from etendue.quantities.arguments import require

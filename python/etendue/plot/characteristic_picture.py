@@ -94,7 +94,7 @@ def plot_characteristic(
     >>> import etendue as et
     >>> from etendue.lightfield.diagnostics import diagnose
     >>> from etendue.lightfield.light_field import LightField
-    >>> from etendue.lightfield.surfaces import Disk
+    >>> from etendue.lightfield.carrier import Disk
     >>> field = LightField.fit(et.RingSource(rays=5_000), Disk(radius=30), depths=(4, 4, 2, 2))
     >>> [axes.get_ylabel() for axes in plot_characteristic(diagnose(field)).axes]
     ['luminance [cd/m²]', 'flux [lm]']

@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError
+from etendue.lightfield.carrier import Part
 from etendue.lightfield.etendue_density import EtendueDensity, PartField, core_part
-from etendue.lightfield.surfaces import Part
 from etendue.units import MM2_PER_M2
 
 FloatArray = npt.NDArray[np.float64]

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from etendue.instruments.near_field.positions import ArmPositions
 from etendue.instruments.near_field.starting_points import on_surface
-from etendue.lightfield.surfaces import Surface
+from etendue.lightfield.carrier import Surface
 from etendue.quantities.observer import Observer, Screen
 
 Array = npt.NDArray[np.float64]

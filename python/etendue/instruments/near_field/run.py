@@ -19,8 +19,8 @@ from etendue.instruments.near_field.pixel_rays import PixelRays, in_blocks
 from etendue.instruments.near_field.setting import Setting, counts_dtype
 from etendue.instruments.near_field.starting_points import closest_surface
 from etendue.instruments.near_field.storage import read_run, write_run
+from etendue.lightfield.carrier import Surface
 from etendue.lightfield.light_field import LightField
-from etendue.lightfield.surfaces import Surface
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from etendue.lightfield.carrier import Disk, Part, Plane, Surface
 from etendue.lightfield.selection.settings import DEFAULT
 from etendue.lightfield.selection.trial_surfaces import TrialSurfaces
-from etendue.lightfield.surfaces import Disk, Part, Plane, Surface
 from etendue.quantities.ray_set import RaySet
 
 Array = npt.NDArray[np.float64]

@@ -33,7 +33,7 @@ class SphericalPixels(Pixelation):
 
     Examples
     --------
-    >>> from etendue.lightfield.surfaces import Hemisphere
+    >>> from etendue.lightfield.carrier import Hemisphere
     >>> [SphericalPixels(Hemisphere(radius=1.264).parts()[0], n).count for n in (4, 7, 16)]
     [49, 169, 961]
     """
@@ -158,7 +158,7 @@ class CylindricalPixels(Pixelation):
 
     Examples
     --------
-    >>> from etendue.lightfield.surfaces import Cylinder
+    >>> from etendue.lightfield.carrier import Cylinder
     >>> pixels = CylindricalPixels(Cylinder(radius=2, bottom=0, top=5).parts()[0], 1.0)
     >>> pixels.columns, pixels.rows, pixels.cells(np.array([0])).axes[0, 0].tolist()
     (13, 5, [0.0, 0.0, -1.0])

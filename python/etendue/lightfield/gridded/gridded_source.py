@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.formats.patch_folder import write_patch_folder
+from etendue.lightfield.carrier import Surface
 from etendue.lightfield.gridded import angular
 from etendue.lightfield.gridded.fitting import Account, all_batches, fill_bins, lit_pixels, patches_of
 from etendue.lightfield.gridded.pixelated import CentreOn, PixelatedSurface
@@ -22,7 +23,6 @@ from etendue.lightfield.gridded.reading import read_gridded
 from etendue.lightfield.gridded.sampling import RECORD, sampled_records
 from etendue.lightfield.gridded.summing import summed_intensity
 from etendue.lightfield.pilot_sample import check_near_field
-from etendue.lightfield.surfaces import Surface
 from etendue.quantities.arguments import SURFACE, require, require_callable, require_number
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.patches import Patches
@@ -73,7 +73,7 @@ class GriddedSource:
     Examples
     --------
     >>> import etendue as et
-    >>> from etendue.lightfield.surfaces import Disk
+    >>> from etendue.lightfield.carrier import Disk
     >>> rays = et.RingSource(rays=100_000, seed=3)
     >>> grid = GriddedSource.fit(rays, Disk(radius=30), pixel=10, threshold=2.1)
     >>> len(grid.patches), round(grid.total_flux, 6)

@@ -11,9 +11,10 @@ from typing import Literal
 import numpy as np
 
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.lightfield.carrier import Part, Surface
+from etendue.lightfield.carrier.part import FLAT
 from etendue.lightfield.gridded.curved_pixels import CylindricalPixels, SphericalPixels
 from etendue.lightfield.gridded.pixels import SLACK, Array, Cells, Indices, Pixelation, SquarePixels, flat_size
-from etendue.lightfield.surfaces import FLAT, Part, Surface
 from etendue.quantities.arguments import require, require_number
 
 CentreOn = Literal["auto", "corner", "pixel"]
@@ -38,7 +39,7 @@ class PixelatedSurface:
 
     Examples
     --------
-    >>> from etendue.lightfield.surfaces import Dome
+    >>> from etendue.lightfield.carrier import Dome
     >>> dome = PixelatedSurface.cut(Dome(radius=1.264), pixel=0.125, parallels=16)
     >>> [p.count for p in dome.pixels], dome.offsets.tolist()
     ([484, 961], [0, 484, 1445])

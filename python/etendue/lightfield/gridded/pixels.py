@@ -1,7 +1,7 @@
 """Pixels of a carrier surface and their local axes: step 2 of section 3.2.2 of [Audenaert2014]_, and section 3.3.2.
 
-Every part of a surface (`etendue.lightfield.surfaces.Part`) has a pixelation of its own. A pixelation knows three things:
-where a line crosses its part outwards, in which pixel that is, and what each pixel looks like.
+Every part of a surface (`etendue.lightfield.carrier.part.Part`) has a pixelation of its own. A pixelation knows three
+things: where a line crosses its part outwards, in which pixel that is, and what each pixel looks like.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from etendue.lightfield.surfaces import Part
+from etendue.lightfield.carrier import Part
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -117,7 +117,7 @@ def flat_size(part: Part) -> tuple[float, float]:
 
     Examples
     --------
-    >>> from etendue.lightfield.surfaces import Disk
+    >>> from etendue.lightfield.carrier import Disk
     >>> flat_size(Disk(radius=2).parts()[0])
     (4.0, 4.0)
     """
@@ -141,7 +141,7 @@ class SquarePixels(Pixelation):
 
     Examples
     --------
-    >>> from etendue.lightfield.surfaces import Disk, Plane
+    >>> from etendue.lightfield.carrier import Disk, Plane
     >>> pixels = SquarePixels(Disk(radius=1.264).parts()[0], 0.125)
     >>> pixels.count, pixels.cells(np.array([0])).centre.round(4).tolist()
     (484, [[-1.3125, -1.3125, 0.0]])

@@ -10,9 +10,9 @@ import numpy as np
 
 from etendue.errors import EtendueError, FormatError
 from etendue.formats.patch_folder import REWRITE, PatchFolder, read_patch_folder
+from etendue.lightfield.carrier import parse_surface
 from etendue.lightfield.gridded.fitting import Account
 from etendue.lightfield.gridded.pixelated import PixelatedSurface
-from etendue.lightfield.surfaces import parse_surface
 from etendue.quantities.patches import Patches
 from etendue.quantities.provenance import Provenance
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from etendue.lightfield.carrier import Box, Cylinder
+from etendue.lightfield.carrier.cylinder import AXES
+from etendue.lightfield.carrier.sizing import SLACK, STRAY
 from etendue.lightfield.counting import FloatArray
-from etendue.lightfield.surfaces import AXES, SLACK, STRAY, Box, Cylinder
 
 LINES = 1 << 12
 """Lines that one search for the smallest ball looks at."""

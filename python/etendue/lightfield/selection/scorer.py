@@ -13,10 +13,10 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.lightfield.candidate import FINE_POSITIONS, MIXED_IN, Images, Score, grow_part, images_of
+from etendue.lightfield.carrier import Part
 from etendue.lightfield.counting import FloatArray, PartCounts, Sums
 from etendue.lightfield.etendue_density import core_part
 from etendue.lightfield.selection.settings import DEFAULT, Grid, SelectionSettings
-from etendue.lightfield.surfaces import Part
 from etendue.lightfield.trees import POSITIONS
 from etendue.quantities.ray_set import RaySet
 

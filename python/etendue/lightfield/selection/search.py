@@ -10,13 +10,14 @@ import numpy as np
 
 from etendue.concurrency import on_one_blas_thread
 from etendue.errors import ArgumentError
+from etendue.lightfield.carrier import Disk, Dome, Plane, Surface
+from etendue.lightfield.carrier.sizing import SLACK
 from etendue.lightfield.focusing import focused_about
 from etendue.lightfield.pilot_sample import FEWEST, even_density, pilot_sample
 from etendue.lightfield.selection.line_search import golden_section, round_numbers_near
 from etendue.lightfield.selection.scorer import WITH_IMAGES, HeldOutScore, SurfaceScorer
 from etendue.lightfield.selection.settings import DEFAULT, Grid, SelectionSettings
 from etendue.lightfield.selection.trial_surfaces import FLATS, TrialSurfaces
-from etendue.lightfield.surfaces import SLACK, Disk, Dome, Plane, Surface
 from etendue.lightfield.trees import holding_memory
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream, checked_threads

@@ -6,12 +6,14 @@ import dataclasses
 
 import numpy as np
 
+from etendue.lightfield.carrier import Box, Cylinder, Disk, Dome, Hemisphere, Part, Plane, Sphere, Surface
+from etendue.lightfield.carrier.cylinder import AXES
+from etendue.lightfield.carrier.sizing import SLACK
 from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.pilot_sample import pilot_sample, selected_rays
 from etendue.lightfield.selection.bounding import ball_centre, box_of_lines, cylinder_of_lines, near_rays, start_centre
 from etendue.lightfield.selection.line_search import golden_section
 from etendue.lightfield.selection.settings import SelectionSettings
-from etendue.lightfield.surfaces import AXES, SLACK, Box, Cylinder, Disk, Dome, Hemisphere, Part, Plane, Sphere, Surface
 from etendue.quantities.ray_set import RaySet
 
 FLATS: tuple[tuple[type[Plane | Disk], bool], ...] = ((Plane, False), (Disk, False), (Plane, True), (Disk, True))

@@ -14,9 +14,9 @@ from etendue.description.values import AsCount, Index, Length, Positive
 from etendue.errors import ArgumentError
 from etendue.formats.patch_folder import is_patch_folder
 from etendue.formats.rays import read_rays
+from etendue.lightfield.carrier import parse_surface
 from etendue.lightfield.gridded.core_patches import core_patches
 from etendue.lightfield.gridded.gridded_source import GriddedSource
-from etendue.lightfield.surfaces import parse_surface
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
