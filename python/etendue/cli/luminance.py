@@ -37,17 +37,11 @@ from etendue.formats.patch_folder import is_patch_folder
 from etendue.lightfield.light_field import LightField
 from etendue.luminance.estimate import Acceptance, luminance_map
 from etendue.luminance.framing import centre_of_light, framed_screens, probe
-from etendue.luminance.methods import (
-    METHOD_NAMES,
-    AnyMethod,
-    PathTracing,
-    Spelling,
-    choose_method,
-    kind_of_source,
-    mismatch,
-)
+from etendue.luminance.method_choice import Spelling, choose_method, mismatch
+from etendue.luminance.methods import METHOD_NAMES, AnyMethod, PathTracing
 from etendue.luminance.opening import SCENE_EXTENSION, open_source
 from etendue.luminance.regions import AnyRegion
+from etendue.luminance.source_kinds import kind_of_source
 from etendue.plot.animation import plot_animation
 from etendue.plot.colour_scale import SCALES
 from etendue.quantities.luminance_map import LuminanceMap

@@ -14,10 +14,12 @@ from etendue.lightfield.pilot_sample import check_near_field
 from etendue.luminance.cone_map import look_through_cone
 from etendue.luminance.framing import beyond_notes, framed_screens, is_far, missed_notes, probe, shows_whole
 from etendue.luminance.looking import look_at_field
-from etendue.luminance.methods import AnyMethod, Cone, FromField, MethodName, PathTracing, choose_method, kind_of_source
+from etendue.luminance.method_choice import choose_method
+from etendue.luminance.methods import AnyMethod, Cone, FromField, MethodName, PathTracing
 from etendue.luminance.opening import open_source
 from etendue.luminance.scatter_map import look_at_events
 from etendue.luminance.scene_map import look_at_scene
+from etendue.luminance.source_kinds import kind_of_source
 from etendue.quantities.arguments import require_callable
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.memory import require_memory
