@@ -34,7 +34,10 @@ import etendue as et
 import numpy as np
 import numpy.typing as npt
 from etendue import _core
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.building import core_scene
 from etendue.scene import compile_scene
 from timing import timed

@@ -20,7 +20,8 @@ import numpy as np
 import numpy.typing as npt
 from chapter_4 import PET
 from etendue.plot import style
-from etendue.quantities.bsdf_data import PolarGrid, direction
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.scans import harvey_shack
 from etendue.scatter.scans.interpolations import METHODS, SMALLEST, specular_centred, tabulated
 from experiments import goniometer

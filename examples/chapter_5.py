@@ -23,7 +23,10 @@ import numpy.typing as npt
 from etendue.instruments.agreement import variation
 from etendue.instruments.stopping import RULES
 from etendue.plot import style
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from experiments.panels import FAINT, INK, LINES, legend_below, new_figure, print_table, save
 from matplotlib.axes import Axes
 from scipy.optimize import brentq

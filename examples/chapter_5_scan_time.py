@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from etendue.instruments.detectors import Readings
 from etendue.plot import style
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from experiments.panels import LINES, legend_below, new_figure, print_table, save
 
 Array = npt.NDArray[np.float64]

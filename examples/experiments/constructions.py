@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 from etendue.plot import style
-from etendue.quantities.bsdf_data import mirrored
+from etendue.quantities.bsdf_directions import mirrored
 from etendue.scatter.scans import harvey_shack
 from etendue.scatter.scans.goniometer import detector_direction, incident_direction
 from experiments.panels import FAINT, INK, LINES, new_figure, save

@@ -8,7 +8,10 @@ import math
 import etendue as et
 import numpy as np
 import numpy.typing as npt
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, mirrored
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction, mirrored
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 
 Array = npt.NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from etendue.plot import style
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.patches import Polygon

@@ -12,7 +12,10 @@ WORK = """
 import os, sys
 import etendue as et
 import numpy as np
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 
 LAMP = {"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 100}
 WALL = {"shape": {"kind": "rectangle", "width": 20, "height": 20}, "at": [0, 0, 9], "toward": [0, 0, -1]}

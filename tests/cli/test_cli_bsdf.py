@@ -10,7 +10,10 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 import pytest
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.materials import MATERIALS
 from oracles.tracepro_files import abg_side, surface_property
 

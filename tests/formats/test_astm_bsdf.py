@@ -12,7 +12,7 @@ import pytest
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf import read_bsdf_data
 from etendue.formats.bsdf.points import projected_solid_angles
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 
 Array = npt.NDArray[np.float64]
 

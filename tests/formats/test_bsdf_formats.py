@@ -16,7 +16,10 @@ from etendue.errors import ArgumentError, EtendueError, FormatError, UnknownName
 from etendue.formats.bsdf import BSDF_FORMATS, read_bsdf_data, write_bsdf_data
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.klems import BASES
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from formats.slanted import Slanted, SlantedOnce, coarsen
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st

@@ -15,7 +15,10 @@ import numpy.typing as npt
 import pytest
 from etendue.formats.bsdf import BSDF_FORMATS, read_bsdf_data, write_bsdf_data
 from etendue.formats.bsdf.bsdf_format import BsdfFormat
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.errors import with_standard_errors
 from etendue.scatter.models.finish import Finish
 from formats.slanted import coarsen

@@ -9,7 +9,10 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.formats.bsdf import read_bsdf_data, write_bsdf_data
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 
 GRID = PolarGrid("normal", np.arange(1.0, 90.0, 4.0), np.arange(0.0, 360.0, 10.0))
 DARK, NOISE = 0.002, 0.008

@@ -11,7 +11,10 @@ import numpy as np
 import pytest
 from etendue.errors import FormatError
 from etendue.formats.bsdf import read_bsdf_data
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction, light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 
 HAND = """type bsdf_data
 format angles=deg bsdf=value scale=0.5

@@ -14,7 +14,7 @@ import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.bsdf import read_bsdf_data
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from oracles.bsdf_files import merl, pab, rgl, tensors
 
 Array = npt.NDArray[np.float64]

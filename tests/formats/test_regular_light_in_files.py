@@ -11,7 +11,7 @@ import pytest
 from etendue.errors import ArgumentError
 from etendue.formats.bsdf import BSDF_FORMATS, read_bsdf_data, write_bsdf_data
 from etendue.formats.bsdf.regular import regular_of
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from formats.slanted import SlantedOnce, coarsen
 from oracles.tracepro_files import NAMES, abg_side, ellipse, fixed, share, surface_property
 

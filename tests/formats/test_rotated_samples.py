@@ -18,7 +18,7 @@ import numpy.typing as npt
 import pytest
 from etendue.formats.bsdf import BSDF_FORMATS, read_bsdf_data
 from etendue.formats.bsdf.bsdf_format import BsdfFormat
-from etendue.quantities.bsdf_data import BsdfSlice
+from etendue.quantities.bsdf_slice import BsdfSlice
 from formats.slanted import coarsen
 from oracles import rotated_samples as by_hand
 

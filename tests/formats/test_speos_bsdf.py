@@ -11,7 +11,7 @@ import pytest
 from etendue.errors import FormatError
 from etendue.formats.bsdf import read_bsdf_data
 from etendue.formats.bsdf.speos import write
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 
 PHI = "\t0 90 180 270 360"
 

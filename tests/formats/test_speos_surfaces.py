@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from etendue.errors import ArgumentError, FormatError, UnsupportedFormatError
 from etendue.formats.bsdf import read_bsdf_data
-from etendue.quantities.bsdf_data import BsdfData, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
 from oracles.bsdf_files import COATED, SCATTERING, SIMPLE
 
 BRDF = """OPTIS - brdf surface file v8.0

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf import read_bsdf_data
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 
 Array = npt.NDArray[np.float64]
 

@@ -13,7 +13,8 @@ import pytest
 from etendue.errors import FormatError
 from etendue.formats.bsdf import read_bsdf_data, write_bsdf_data
 from etendue.formats.bsdf.tensor_tree import FORMAT
-from etendue.quantities.bsdf_data import BsdfSlice, direction
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
 from formats.slanted import Slanted
 
 Array = npt.NDArray[np.float64]

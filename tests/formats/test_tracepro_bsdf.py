@@ -11,7 +11,7 @@ import pytest
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf import read_bsdf_data
 from etendue.formats.bsdf.tracepro_lines import COLUMNS, TABLE_COLUMNS
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 
 HEAD = """TracePro Surface Property Data
 File Name\tC:\\x.txt

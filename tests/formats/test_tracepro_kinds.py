@@ -13,7 +13,8 @@ import numpy.typing as npt
 import pytest
 from etendue.errors import FormatError, UnsupportedFormatError
 from etendue.formats.bsdf import read_bsdf_data
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_slice import BsdfSlice
 from oracles import tracepro_files as by_hand
 from oracles.tracepro_files import Function, Row, abg_side, row, section, surface_property
 

@@ -9,7 +9,9 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.formats.bsdf import read_bsdf_data, write_bsdf_data
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from oracles.tracepro_files import abg_side, row, section, surface_property
 
 

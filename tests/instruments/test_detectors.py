@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from oracles.verdicts import LARGEST_Z, assert_agree, assert_differ
 
 Array = npt.NDArray[np.float64]

@@ -21,7 +21,7 @@ from etendue.instruments.regular_share import RegularShare
 from etendue.instruments.round_blur import RoundBlur
 from etendue.instruments.total_variation import total_variation
 from etendue.instruments.turned_sample import TurnedSample, turned
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from etendue.scatter.lobe_models import LOBE_MODELS
 from oracles.verdicts import assert_agree, assert_differ
 

@@ -8,7 +8,8 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import BsdfData, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import light_from
 
 PAINT = et.bsdf.Lambertian(reflectance=0.5)
 BARE = et.ScatterGoniometer(photons=1e8)

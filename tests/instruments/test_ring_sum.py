@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from etendue.instruments.goniometer_scan import GoniometerScan
 from etendue.instruments.positions import Plane, detector_directions
-from etendue.quantities.bsdf_data import light_from
+from etendue.quantities.bsdf_directions import light_from
 
 LOBES = {
     "gaussian": et.bsdf.Gaussian(peak=1, sigma=0.15),

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
 from etendue.instruments.goniometer_scan import GoniometerScan, read_goniometer_scan, total_scatter
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from oracles.verdicts import LARGEST_Z, SIGNIFICANCE, assert_agree, assert_differ
 from scipy.optimize import brentq
 from scipy.stats import chi2

@@ -13,7 +13,10 @@ import pytest
 from etendue import _core
 from etendue.luminance import scene_map
 from etendue.luminance.gathering import BLOCKS, LEAST_LINES, MOST_COLOURS, NOT_TAKEN, PILOT, Comparison, blocks
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.building import core_scene
 from etendue.scene import compile_scene
 from oracles.gathered import common_error

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from etendue.errors import ArgumentError
 from etendue.plot.bsdf_picture import polar_surface
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from etendue.quantities.threshold_sweep import COLUMNS, ThresholdSweep
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure

@@ -5,8 +5,11 @@ from __future__ import annotations
 import etendue as et
 import numpy as np
 import pytest
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import light_from
 from etendue.quantities.bsdf_holes import filled
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.models import Gaussian, Lambertian, Mixture
 
 FLAT = Mixture(parts=(Lambertian(reflectance=0.3), Gaussian(peak=3, sigma=0.15)))

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from etendue.quantities.bsdf_data import BsdfSlice, GridFrame, PolarGrid, direction, light_from
+from etendue.quantities.bsdf_directions import direction, light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import GridFrame, PolarGrid
 
 
 @pytest.mark.parametrize("frame", ["normal", "specular", "cosines"])

@@ -9,7 +9,10 @@ import etendue as et
 import numpy as np
 import numpy.typing as npt
 import pytest
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.models import MODELS
 from etendue.scene import compile_scene
 

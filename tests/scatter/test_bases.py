@@ -8,7 +8,10 @@ import etendue as et
 import numpy as np
 import numpy.typing as npt
 import pytest
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.bases import Base, base_of, share_in
 from etendue.scatter.resampling import lobes_of
 

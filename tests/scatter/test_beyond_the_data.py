@@ -6,7 +6,10 @@ import re
 import etendue as et
 import numpy as np
 import pytest
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 
 
 def _table(*, last: float, azimuths: int, theta: float) -> et.BsdfTable:

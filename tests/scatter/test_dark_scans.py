@@ -9,7 +9,7 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from etendue.scatter.scans.interpolations import tabulated
 
 DARK, NOISE, THETA = 0.002, 0.008, 30.0

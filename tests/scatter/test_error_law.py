@@ -5,7 +5,7 @@ from __future__ import annotations
 import etendue as et
 import numpy as np
 import pytest
-from etendue.quantities.bsdf_data import direction, light_from
+from etendue.quantities.bsdf_directions import direction, light_from
 from etendue.scatter.error_law import error_law
 from etendue.scatter.model_fit import fit_bsdf
 from etendue.scatter.scans.scans import Scans

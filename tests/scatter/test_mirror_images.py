@@ -9,7 +9,10 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction, light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 
 RADIAL = np.arange(0.0, 91.0, 2.0)
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError, MissingLibraryError, UnknownNameError
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from etendue.scatter.model_fit import FITTED_MODELS, fit_bsdf
 from oracles.verdicts import SIGNIFICANCE, assert_agree
 from scipy.stats import chi2

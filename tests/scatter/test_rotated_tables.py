@@ -9,7 +9,10 @@ import etendue as et
 import numpy as np
 import numpy.typing as npt
 import pytest
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, GridFrame, PolarGrid, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import GridFrame, PolarGrid
 from oracles import rotated_samples as by_hand
 
 Array = npt.NDArray[np.float64]

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from etendue.errors import ArgumentError, FormatError
 from etendue.instruments.goniometer_scan import read_goniometer_scan
-from etendue.quantities.bsdf_data import BsdfSlice, direction, light_from
+from etendue.quantities.bsdf_directions import direction, light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
 
 NAMES = "theta_i,phi_i,theta_s,phi_s,bsdf"
 STAGES = "# solid_angle = 1e-3\nalpha,beta,gamma,delta,flux\n0,0,0,10,0.5\n"

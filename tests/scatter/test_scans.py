@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
-from etendue.quantities.bsdf_data import PolarGrid, direction, mirrored
+from etendue.quantities.bsdf_directions import direction, mirrored
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.materials import MATERIALS
 from etendue.scatter.model_fit import fit_bsdf
 from etendue.scatter.scans import harvey_shack

@@ -10,7 +10,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction, light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.resampling import ACCURACY, lobes_of
 from oracles.both_ways import forwards_and_backwards_agree, two_walls
 from scipy.stats import chi2

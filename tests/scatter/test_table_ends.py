@@ -10,7 +10,10 @@ import numpy.typing as npt
 import pytest
 from etendue.errors import UnknownNameError
 from etendue.formats.bsdf.functions import sampled
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.appearance import appearance
 
 Array = npt.NDArray[np.float64]

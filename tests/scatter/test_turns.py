@@ -7,7 +7,7 @@ from pathlib import Path
 import etendue as et
 import numpy as np
 import pytest
-from etendue.quantities.bsdf_data import light_from
+from etendue.quantities.bsdf_directions import light_from
 from etendue.scatter.turns import MOST, TOLERANCE, turns_of
 
 

@@ -11,7 +11,10 @@ import pytest
 from etendue.description.files import Files
 from etendue.description.tables import Grid, on_common_nodes
 from etendue.errors import ArgumentError, SceneError
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.bsdf import Bsdf
 from etendue.scatter.materials import MATERIALS
 from etendue.scatter.models.shares import PARTS

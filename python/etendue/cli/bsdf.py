@@ -18,7 +18,7 @@ from etendue.formats.bsdf import BSDF_FORMATS
 from etendue.formats.rt300s import is_rt300s
 from etendue.formats.scans_csv import DIRECTIONS, STAGES, read_columns
 from etendue.plot import plot_bsdf
-from etendue.quantities.bsdf_data import BsdfSlice
+from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.quantities.measured import measured
 from etendue.scatter.appearance import GLASS, appearance
 from etendue.scatter.bsdf import WAVELENGTH

@@ -29,7 +29,7 @@ from etendue.instruments.round_blur import RoundBlur
 from etendue.instruments.scatter_goniometer import ScatterGoniometer
 from etendue.instruments.total_variation import STRENGTHS, total_variation
 from etendue.quantities.arguments import require, require_number
-from etendue.quantities.bsdf_data import BsdfSlice
+from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.quantities.ray_stream import checked_seed
 from etendue.scatter.lobe_models import LOBE_MODELS, Fitted
 

@@ -18,7 +18,8 @@ from etendue.instruments.bench import Bench
 from etendue.instruments.goniometer_scan import GoniometerScan, Way, flux_of_unit_bsdf, known_of, read_goniometer_scan
 from etendue.instruments.lobe_table import polar_slice
 from etendue.quantities.arguments import as_numbers, require_numbers
-from etendue.quantities.bsdf_data import BsdfSlice, direction, light_from
+from etendue.quantities.bsdf_directions import direction, light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
 
 Array = npt.NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from etendue.formats.scans_csv import DIRECTIONS, ERROR, POSITIONS, read_columns
 from etendue.instruments.positions import Plane, detector_directions
 from etendue.instruments.ring_sum import sum_of_rings
 from etendue.quantities.arguments import as_numbers, require_numbers
-from etendue.quantities.bsdf_data import light_from
+from etendue.quantities.bsdf_directions import light_from
 from etendue.scatter.scans.scans import Scans
 
 Array = npt.NDArray[np.float64]

@@ -10,7 +10,9 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.quantities.arguments import require
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.table import BsdfTable
 
 Array = npt.NDArray[np.float64]

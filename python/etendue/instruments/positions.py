@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.quantities.arguments import require_number
-from etendue.quantities.bsdf_data import PolarGrid, direction
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.polar_grid import PolarGrid
 
 Array = npt.NDArray[np.float64]
 Plane = Literal["in-plane", "cross-plane"]

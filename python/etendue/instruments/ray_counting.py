@@ -8,7 +8,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError
 from etendue.instruments.beam_and_aperture import axes_of, into_the_sample
 from etendue.instruments.bench import Bench
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from etendue.scatter.bsdf import Bsdf
 
 Array = npt.NDArray[np.float64]

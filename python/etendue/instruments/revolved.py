@@ -9,7 +9,10 @@ from etendue.errors import ArgumentError
 from etendue.instruments.goniometer_scan import GoniometerScan, cubic
 from etendue.instruments.operators import middle_of
 from etendue.quantities.arguments import as_numbers, require, require_number
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.table import BsdfTable
 
 Array = npt.NDArray[np.float64]

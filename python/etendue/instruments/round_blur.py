@@ -12,7 +12,7 @@ from etendue.instruments.beam_and_aperture import axes_of
 from etendue.instruments.bench import TOGETHER, Sight
 from etendue.instruments.goniometer_scan import GoniometerScan
 from etendue.instruments.operators import folded
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from etendue.quantities.quadrature import gauss_legendre
 
 Array = npt.NDArray[np.float64]

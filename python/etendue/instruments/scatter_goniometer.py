@@ -25,7 +25,8 @@ from etendue.instruments.ray_counting import counted_flux
 from etendue.instruments.sight_quadrature import integrated_flux
 from etendue.instruments.turned_sample import TurnedSample
 from etendue.quantities.arguments import as_numbers, require, require_number, require_numbers
-from etendue.quantities.bsdf_data import BsdfSlice, direction, light_from
+from etendue.quantities.bsdf_directions import direction, light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.scatter.bsdf import Bsdf
 
 Array = npt.NDArray[np.float64]

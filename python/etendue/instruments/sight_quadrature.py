@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.instruments.bench import Bench
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from etendue.scatter.bsdf import Bsdf
 
 Array = npt.NDArray[np.float64]

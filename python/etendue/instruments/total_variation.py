@@ -36,7 +36,7 @@ def total_variation(splines: LobeSplines, strength: float) -> Callable[[Array], 
 
     Examples
     --------
-    >>> from etendue.quantities.bsdf_data import direction
+    >>> from etendue.quantities.bsdf_directions import direction
     >>> from etendue.instruments.lobe_splines import splines_for
     >>> arms = direction([9.0, 10.0, 11.0], 0.0)
     >>> splines = splines_for(arms, arms[1], np.ones(3), 1.0, 1.0)

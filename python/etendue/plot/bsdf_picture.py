@@ -13,7 +13,8 @@ from etendue.errors import ArgumentError
 from etendue.plot import style
 from etendue.plot.map_picture import draw_slim_bar
 from etendue.quantities.arguments import require, require_number
-from etendue.quantities.bsdf_data import PolarGrid, direction
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.bsdf import Bsdf, Side
 
 if TYPE_CHECKING:

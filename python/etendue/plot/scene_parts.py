@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from etendue.tracing.section import Section
 from etendue.tracing.sections import Window
 

@@ -7,7 +7,8 @@ import dataclasses
 import numpy as np
 import numpy.typing as npt
 
-from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 
 Array = npt.NDArray[np.float64]
 
@@ -27,7 +28,7 @@ def unfolded(one: BsdfSlice) -> BsdfSlice:
 
     Examples
     --------
-    >>> from etendue.quantities.bsdf_data import light_from
+    >>> from etendue.quantities.bsdf_directions import light_from
     >>> grid = PolarGrid("normal", [0.0, 90.0], [0.0, 90.0, 180.0])
     >>> half = BsdfSlice(light_from(30.0, 180.0), [[0.1, 0.1], [0.3, 0.3], [0.2, 0.2]], grid=grid)
     >>> whole = unfolded(half)
@@ -69,7 +70,7 @@ def unlike_its_image(one: BsdfSlice) -> float:
 
     Examples
     --------
-    >>> from etendue.quantities.bsdf_data import light_from
+    >>> from etendue.quantities.bsdf_directions import light_from
     >>> grid = PolarGrid("normal", [1.0, 90.0], [0.0, 90.0, 180.0, 270.0])
     >>> one = BsdfSlice(light_from(30.0, 180.0), [[0.2, 0.2], [0.3, 0.3], [0.2, 0.2], [0.1, 0.1]], grid=grid)
     >>> round(unlike_its_image(one), 2)

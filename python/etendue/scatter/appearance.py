@@ -13,7 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.quantities.quadrature import gauss_legendre
 from etendue.scatter.bsdf import Bsdf
 from etendue.scatter.table import BsdfTable

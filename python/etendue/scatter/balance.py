@@ -10,7 +10,9 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.quantities.report import Complaint
 from etendue.scatter.bsdf import WAVELENGTH
 from etendue.scatter.building import built

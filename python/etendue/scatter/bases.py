@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from etendue.quantities.bsdf_data import BsdfSlice
+from etendue.quantities.bsdf_slice import BsdfSlice
 
 Array = npt.NDArray[np.float64]
 
@@ -88,7 +88,8 @@ def base_of(slices: Sequence[BsdfSlice]) -> Base:
 
     Examples
     --------
-    >>> from etendue.quantities.bsdf_data import PolarGrid, direction
+    >>> from etendue.quantities.bsdf_directions import direction
+    >>> from etendue.quantities.polar_grid import PolarGrid
     >>> grid = PolarGrid("normal", [0.0, 45.0, 90.0], [0.0])
     >>> falling = [BsdfSlice(direction(theta, 0.0), [[0.3, 0.2, 0.0]], grid=grid) for theta in (0.0, 50.0)]
     >>> base = base_of(falling)

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.description.files import Files
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from etendue.quantities.vectors import lengths
 from etendue.scatter.building import built
 from etendue.scatter.scans.scans import Scans
@@ -114,7 +114,7 @@ class Bsdf(abc.ABC):
         Examples
         --------
         >>> import etendue as et
-        >>> from etendue.quantities.bsdf_data import direction
+        >>> from etendue.quantities.bsdf_directions import direction
         >>> incident = direction(30.0, 180.0)
         >>> to = np.concatenate([direction(np.arange(0.0, 85.0, 5.0), a) for a in (0.0, 90.0, 180.0)])
         >>> flat = et.Scans(np.tile(incident, (len(to), 1)), to, np.full(len(to), 0.25), reflectance=0.8)

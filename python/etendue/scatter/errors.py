@@ -7,7 +7,9 @@ import dataclasses
 import numpy as np
 import numpy.typing as npt
 
-from etendue.quantities.bsdf_data import NORMAL, BsdfData, BsdfSlice
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import NORMAL
+from etendue.quantities.bsdf_slice import BsdfSlice
 
 Array = npt.NDArray[np.float64]
 
@@ -33,7 +35,8 @@ def with_standard_errors(made: BsdfData, measured: BsdfData) -> BsdfData:
 
     Examples
     --------
-    >>> from etendue.quantities.bsdf_data import PolarGrid, direction
+    >>> from etendue.quantities.bsdf_directions import direction
+    >>> from etendue.quantities.polar_grid import PolarGrid
     >>> coarse, fine = (PolarGrid("normal", radial, [0.0]) for radial in ([0.0, 80.0], [0.0, 20.0, 80.0]))
     >>> one = BsdfSlice(direction(30.0, 0.0), [[0.3, 0.1]], grid=coarse, standard_error=[[0.01, 0.03]])
     >>> other = BsdfSlice(direction(30.0, 0.0), [[0.3, 0.25, 0.1]], grid=fine)

@@ -16,7 +16,8 @@ from etendue.description.files import Files
 from etendue.errors import ArgumentError
 from etendue.formats.bsdf import bsdf_format, read_bsdf_data, write_bsdf_data, write_bsdf_shares
 from etendue.formats.bsdf.bsdf_format import NO_ERRORS, BsdfFormat
-from etendue.quantities.bsdf_data import LEAN, NORMAL, BsdfData
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import LEAN, NORMAL
 from etendue.quantities.report import Complaint
 from etendue.scatter.bsdf import WAVELENGTH, Bsdf, Side
 from etendue.scatter.errors import with_standard_errors

@@ -11,7 +11,9 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.description.files import Files
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, direction
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.scatter.bases import Base, base_of
 from etendue.scatter.bsdf import WAVELENGTH
 from etendue.scatter.building import built

@@ -82,7 +82,7 @@ class BsdfFit:
 
     Examples
     --------
-    >>> from etendue.quantities.bsdf_data import direction
+    >>> from etendue.quantities.bsdf_directions import direction
     >>> to = direction(np.arange(0.0, 80.0, 5.0), 0.0)
     >>> flat = Scans(np.tile(direction(30.0, 180.0), (16, 1)), to, np.full(16, 0.2), standard_error=np.full(16, 0.004))
     >>> found = fit_bsdf(flat, "lambertian")
@@ -232,7 +232,7 @@ def fit_bsdf(scans: Scans, model: str) -> BsdfFit:
 
     Examples
     --------
-    >>> from etendue.quantities.bsdf_data import direction
+    >>> from etendue.quantities.bsdf_directions import direction
     >>> from etendue.scatter.models import ABg
     >>> incident = np.tile(direction(20.0, 180.0), (36, 1))
     >>> to = direction(np.arange(-88.0, 88.0, 4.9), 0.0)

@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import NORMAL, BsdfSlice
+from etendue.quantities.bsdf_directions import NORMAL
+from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.scatter.bases import Base, even_out, share_in
 
 Array = npt.NDArray[np.float64]

@@ -12,8 +12,11 @@ import numpy.typing as npt
 
 from etendue.description.files import Files
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import NORMAL, BsdfData, BsdfSlice, PolarGrid
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import NORMAL
+from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.quantities.mirror_images import unfolded, unlike_its_image
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.quantities.report import Complaint
 from etendue.scatter.balance import CLOSE, MOST, balanced
 from etendue.scatter.bsdf import Bsdf as Bsdf  # noqa: PLC0414 - handed on to `etendue`
@@ -56,7 +59,9 @@ class BsdfTable(Bsdf):
     Examples
     --------
     >>> import numpy as np
-    >>> from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction
+    >>> from etendue.quantities.bsdf_directions import direction
+    >>> from etendue.quantities.bsdf_slice import BsdfSlice
+    >>> from etendue.quantities.polar_grid import PolarGrid
     >>> grid = PolarGrid("normal", [0.0, 90.0], [0.0])
     >>> half = BsdfTable(BsdfData([BsdfSlice(direction(30.0, 0.0), [[0.5 / np.pi] * 2], grid=grid)]))
     >>> half.reflectance([0, 30, 80]).round(6).tolist()
@@ -165,7 +170,8 @@ def share_of(one: BsdfSlice) -> float:
 
     Examples
     --------
-    >>> from etendue.quantities.bsdf_data import PolarGrid, direction
+    >>> from etendue.quantities.bsdf_directions import direction
+    >>> from etendue.quantities.polar_grid import PolarGrid
     >>> grid = PolarGrid("normal", [0.0, 90.0], [0.0])
     >>> round(share_of(BsdfSlice(direction(20.0, 0.0), [[0.1, 0.1]], grid=grid)), 6)
     0.314159

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from etendue.quantities.bsdf_data import NORMAL, light_from
+from etendue.quantities.bsdf_directions import NORMAL, light_from
 
 Array = npt.NDArray[np.float64]
 Evaluate = Callable[[Array, Array], Array]

@@ -92,7 +92,9 @@ def read_bsdf_data(path: str | os.PathLike[str]) -> BsdfData:
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction
+    >>> from etendue.quantities.bsdf_directions import direction
+    >>> from etendue.quantities.bsdf_slice import BsdfSlice
+    >>> from etendue.quantities.polar_grid import PolarGrid
     >>> grid = PolarGrid("specular", [0.0, 90.0], [0.0, 180.0])
     >>> half = BsdfData([BsdfSlice(direction(30.0, 180.0), [[0.16, 0.16]] * 2, grid=grid)])
     >>> with TemporaryDirectory() as folder:

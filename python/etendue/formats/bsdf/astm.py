@@ -16,7 +16,10 @@ from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.points import RIM, below_zero, slices_of
 from etendue.formats.bsdf.tokens import ADVICE, ended_lines
 from etendue.formats.rays.text_rows import number, whole
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]

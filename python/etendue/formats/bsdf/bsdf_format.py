@@ -38,7 +38,7 @@ class Tabulated(Protocol):
         ...
 
     def evaluate(self, incident: npt.ArrayLike, scattered: npt.ArrayLike, *, wavelength: float | None = None) -> Array:
-        """Return f [1/sr] for pairs of unit vectors, shapes (…, 3) that broadcast, in the frame of `bsdf_data`."""
+        """Return f [1/sr] for pairs of unit vectors, shapes (…, 3) that broadcast, in the frame of `bsdf_directions`."""
         ...
 
 

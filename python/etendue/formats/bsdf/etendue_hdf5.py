@@ -14,7 +14,10 @@ from etendue.errors import ArgumentError
 from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.hdf5 import LIBRARY, SIGNATURE, Node, put, reading
 from etendue.formats.strict_json import strict_json
-from etendue.quantities.bsdf_data import GRID_FRAMES, BsdfData, BsdfSlice, PolarGrid, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import GRID_FRAMES, PolarGrid
 from etendue.quantities.report import Complaint
 
 KIND, VERSION = "etendue BSDF", 1

@@ -15,8 +15,11 @@ from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.points import below_zero, doubts, slice_of
 from etendue.formats.bsdf.tokens import ADVICE, ended_lines
 from etendue.formats.rays.text_rows import number
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction, light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.quantities.mirror_images import unfolded
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]

@@ -8,7 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.formats.bsdf.bsdf_format import Tabulated
-from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, light_from
+from etendue.quantities.bsdf_directions import light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 
 Array = npt.NDArray[np.float64]
 

@@ -16,7 +16,9 @@ from etendue.formats.bsdf.points import below_zero
 from etendue.formats.bsdf.window_xml import DAMAGED, WAYS, azimuth_of, block_of, document, read_window
 from etendue.formats.rays.text_rows import number
 from etendue.formats.xml_tree import Element
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, direction, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction, light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]

@@ -8,7 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from etendue.quantities.bsdf_data import NORMAL, BsdfSlice, PolarGrid, direction, light_from
+from etendue.quantities.bsdf_directions import NORMAL, direction, light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
-from etendue.quantities.bsdf_data import BsdfSlice
+from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.quantities.report import Complaint
 
 CLOSE = 0.01

@@ -16,7 +16,10 @@ from etendue.formats.bsdf.points import below_zero
 from etendue.formats.bsdf.shares import scaled
 from etendue.formats.bsdf.tokens import ADVICE, Tokens
 from etendue.formats.encodings import decoded
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction, light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.quantities.report import Complaint
 from etendue.quantities.spectrum import photopic_efficiency
 

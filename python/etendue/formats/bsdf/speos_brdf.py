@@ -18,7 +18,10 @@ from etendue.formats.bsdf.shares import scaled
 from etendue.formats.bsdf.speos import PHI_STEP, THETA, WAYS, flag, past_header, slice_of, table_rows
 from etendue.formats.bsdf.tokens import Tokens
 from etendue.formats.encodings import decoded
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, direction, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import direction, light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 
 Array = npt.NDArray[np.float64]
 

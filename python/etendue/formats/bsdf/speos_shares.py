@@ -13,7 +13,9 @@ import numpy.typing as npt
 
 from etendue.formats.bsdf.bsdf_format import ShareTables
 from etendue.formats.bsdf.tokens import UNENDED, Tokens
-from etendue.quantities.bsdf_data import BsdfSlice, PolarGrid, direction
+from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 
 Array = npt.NDArray[np.float64]
 

@@ -20,7 +20,8 @@ from etendue.formats.bsdf.speos_shares import (
     width,
     words_after_lines,
 )
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_slice import BsdfSlice
 
 START = b"OPTIS - Simple scattering surface file"
 MODES = ("Reflection", "Transmission", "Both")

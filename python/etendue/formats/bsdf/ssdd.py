@@ -21,7 +21,10 @@ from etendue.formats.bsdf.regular import KEYS, regular_of
 from etendue.formats.bsdf.tokens import ADVICE, LARGEST
 from etendue.formats.encodings import decoded
 from etendue.formats.rays.text_rows import number
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.quantities.report import Complaint
 from etendue.quantities.spectrum import photopic_efficiency
 

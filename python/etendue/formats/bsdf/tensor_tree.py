@@ -14,7 +14,8 @@ from etendue.formats.bsdf.bsdf_format import BsdfFormat, Tabulated
 from etendue.formats.bsdf.points import below_zero
 from etendue.formats.bsdf.window_xml import DAMAGED, WAYS, block_of, document, read_window
 from etendue.formats.xml_tree import Element
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_slice import BsdfSlice
 
 Array = npt.NDArray[np.float64]
 

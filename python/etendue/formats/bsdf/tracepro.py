@@ -29,7 +29,10 @@ from etendue.formats.bsdf.tracepro_lines import (
 from etendue.formats.bsdf.tracepro_models import Numbers, Way, forwards, made
 from etendue.formats.bsdf.tracepro_readings import readings
 from etendue.formats.bsdf.tracepro_writing import ABG, ASYMMETRIC, NONE, START, TWO_SIDED, plan_of, write
-from etendue.quantities.bsdf_data import NORMAL, BsdfData, BsdfSlice, PolarGrid, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import NORMAL, light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from etendue.errors import FormatError
 from etendue.formats.bsdf.tokens import ADVICE, ended_lines
 from etendue.formats.rays.text_rows import number
-from etendue.quantities.bsdf_data import NORMAL
+from etendue.quantities.bsdf_directions import NORMAL
 
 Array = npt.NDArray[np.float64]
 

@@ -13,7 +13,9 @@ import numpy.typing as npt
 from etendue.errors import UnsupportedFormatError
 from etendue.formats.bsdf.tracepro_lines import Lines, Rows
 from etendue.formats.bsdf.tracepro_readings import Reading
-from etendue.quantities.bsdf_data import NORMAL, BsdfSlice, PolarGrid, light_from
+from etendue.quantities.bsdf_directions import NORMAL, light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]

@@ -13,7 +13,9 @@ from etendue.formats.bsdf.shares import CLOSE
 from etendue.formats.bsdf.tokens import ADVICE
 from etendue.formats.bsdf.tracepro_lines import TABLE_COLUMNS, Lines, Rows, once_at_the_normal
 from etendue.formats.bsdf.tracepro_models import forwards
-from etendue.quantities.bsdf_data import NORMAL, BsdfSlice, PolarGrid, light_from
+from etendue.quantities.bsdf_directions import NORMAL, light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.quantities.report import Complaint
 
 Array = npt.NDArray[np.float64]

@@ -15,7 +15,9 @@ from etendue.formats.bsdf.shares import CLOSE
 from etendue.formats.bsdf.tracepro_lines import COLUMNS, SIDES, TABLE_COLUMNS
 from etendue.formats.bsdf.tracepro_models import FLOATING, INCIDENCES, forwards
 from etendue.formats.bsdf.tracepro_readings import readings
-from etendue.quantities.bsdf_data import NORMAL, BsdfData, BsdfSlice
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import NORMAL
+from etendue.quantities.bsdf_slice import BsdfSlice
 
 Array = npt.NDArray[np.float64]
 

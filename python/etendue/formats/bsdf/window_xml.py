@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError
 from etendue.formats.xml_tree import Element, parse_xml
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.quantities.report import Complaint
 
 LARGEST = 1 << 28

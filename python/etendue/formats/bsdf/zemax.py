@@ -14,7 +14,10 @@ from etendue.formats.bsdf.functions import values_on
 from etendue.formats.bsdf.points import below_zero
 from etendue.formats.bsdf.shares import disagreements
 from etendue.formats.bsdf.tokens import Tokens
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 
 Array = npt.NDArray[np.float64]
 

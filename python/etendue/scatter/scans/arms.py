@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.quantities.bsdf_data import PolarGrid
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.scans.scans import Scans
 
 Array = npt.NDArray[np.float64]

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.rt300s import is_rt300s, read_rt300s
 from etendue.formats.scans_csv import DIRECTIONS, ERROR, STAGES, read_columns, read_remarks
-from etendue.quantities.bsdf_data import direction
+from etendue.quantities.bsdf_directions import direction
 from etendue.scatter.scans.goniometer import bsdf_of_flux, detector_direction, incident_direction
 from etendue.scatter.scans.scans import Scans
 

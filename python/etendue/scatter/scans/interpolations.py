@@ -11,7 +11,10 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.extras import require
 from etendue.formats.bsdf.points import below_zero
-from etendue.quantities.bsdf_data import BsdfData, BsdfSlice, PolarGrid, light_from
+from etendue.quantities.bsdf_data import BsdfData
+from etendue.quantities.bsdf_directions import light_from
+from etendue.quantities.bsdf_slice import BsdfSlice
+from etendue.quantities.polar_grid import PolarGrid
 from etendue.quantities.report import Complaint
 from etendue.scatter.scans import harvey_shack
 from etendue.scatter.scans.arms import AT_CENTRE, MOST_ARMS, ON_ARM, apart, arms_of, azimuths_of, beside
@@ -334,7 +337,7 @@ def tabulated(scans: Scans, method: str = AUTOMATIC, smallest: float = SMALLEST)
 
     Examples
     --------
-    >>> from etendue.quantities.bsdf_data import direction
+    >>> from etendue.quantities.bsdf_directions import direction
     >>> incident = direction(30.0, 180.0)
     >>> scattered = np.concatenate([direction(np.arange(0.0, 85.0, 5.0), a) for a in (0.0, 90.0, 180.0)])
     >>> flat = Scans(np.tile(incident, (len(scattered), 1)), scattered, np.full(len(scattered), 0.25))
