@@ -10,10 +10,11 @@ import typer
 from etendue.cli.stated import refuse
 from etendue.cli.terminal import check_folder, complain, count, half_width, one_of, print_json, say
 from etendue.instruments.directional_scan import DirectionalScan
+from etendue.instruments.goniometer_measurement import Method
 from etendue.instruments.goniometer_scan import Way
 from etendue.instruments.positions import Plane
 from etendue.instruments.samples import read_sample
-from etendue.instruments.scatter_goniometer import BARE_STEP, SPAN, STEP, Method, ScatterGoniometer
+from etendue.instruments.scatter_goniometer import BARE_STEP, SPAN, STEP, ScatterGoniometer
 from etendue.quantities.powers_of_ten import counted
 
 COLLIMATED = 0.0

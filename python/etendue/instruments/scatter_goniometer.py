@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -11,42 +11,24 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.instruments.beam_and_aperture import Aperture, Beam, Profile, Shape
 from etendue.instruments.bench import Bench
+from etendue.instruments.detector_head import DetectorHead
 from etendue.instruments.directional_scan import DirectionalScan
+from etendue.instruments.goniometer_measurement import Measurement, Method, bare_scan
 from etendue.instruments.goniometer_scan import GoniometerScan, Way
-from etendue.instruments.positions import (
-    Plane,
-    detector_directions,
-    even_angles,
-    hemisphere,
-    hemisphere_around,
-    window,
-)
-from etendue.instruments.ray_counting import counted_flux
-from etendue.instruments.sight_quadrature import integrated_flux
+from etendue.instruments.photon_counter import PhotonCounter
+from etendue.instruments.positions import Plane, even_angles, hemisphere, hemisphere_around, window
 from etendue.instruments.turned_sample import TurnedSample
-from etendue.quantities.arguments import as_numbers, require, require_number, require_numbers
-from etendue.quantities.bsdf_directions import direction, light_from
+from etendue.quantities.arguments import as_numbers, require, require_numbers
 from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.scatter.bsdf import Bsdf
 
 Array = npt.NDArray[np.float64]
-Method = Literal["trace", "quadrature"]
 
 STEP, BARE_STEP = 0.1, 0.05
 """Between positions with a sample and without one, if nothing is said [°]."""
 
 SPAN = 9.0
 """To which angles on both sides a scan goes if nothing is said [°]: 181 positions in steps of 0.1°."""
-
-
-SHARED = "all positions count the same rays: neighbours err together"
-"""Note of scans whose errors are not independent."""
-
-SQUARE = (
-    "the aperture is square: what it shows of a point is not round, as the rings of deconvolve take it to be, whose peak "
-    "may be off by more than half; deconvolve_directions knows the aperture"
-)
-"""Note of scans by a square aperture."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -134,14 +116,8 @@ class ScatterGoniometer:
                 f"a divergence of {self.divergence:g}° and a source_angle of {self.source_angle:g}°; give a divergence "
                 "below 45°, and a source that is seen under less than 90°"
             )
-        if self.photons is not None and not self.photons > 0.0:
-            raise ArgumentError(f"{self.photons} photons; give more than 0, or None for no noise")
-        if self.dark < 0.0 or (self.dark and self.photons is None):
-            raise ArgumentError("dark counts are given without photons, or are negative; give both, and none below 0")
-        if not self.head_diameter >= 0.0:
-            raise ArgumentError(f"a head of the detector of {self.head_diameter:g} mm; give its diameter, 0 or more")
-        if not self.drift > -1.0:
-            raise ArgumentError(f"a drift of {self.drift:g}; give more than -1, at which nothing is left of the beam")
+        # The parts check the rest when they are made.
+        _ = self._counter, self._head
         object.__setattr__(self, "profile", self.bench.beam.profile)
 
     @property
@@ -149,6 +125,16 @@ class ScatterGoniometer:
         """Beam, aperture and distance."""
         beam = Beam(self.beam_diameter, self.profile, self.divergence, self.source_angle)
         return Bench(beam, Aperture(self.aperture, self.aperture_diameter, self.inner_diameter), self.distance)
+
+    @property
+    def _head(self) -> DetectorHead:
+        """The head of the detector."""
+        return DetectorHead(self.head_diameter, self.beam_diameter, self.distance)
+
+    @property
+    def _counter(self) -> PhotonCounter:
+        """What makes noise of the flux."""
+        return PhotonCounter(self.photons, self.dark, self.drift)
 
     @property
     def solid_angle(self) -> float:
@@ -185,14 +171,7 @@ class ScatterGoniometer:
             # Two positions more, where there is no light any more.
             span = (np.ceil(self.bench.reach / step) + 2.0) * step if step > 0.0 else 1.0
         angle = even_angles(0.0, step, float(span))
-        if rays is None:
-            flux, error = self.bench.beam.overlap(self.bench.aperture, angle, self.distance), np.zeros(angle.shape)
-        else:
-            arms = detector_directions(angle, 0.0, "in-plane", behind=True)
-            flux, error = counted_flux(
-                self.bench, None, arms, rays, seed, theta=0.0, wavelength=self.wavelength, behind=True
-            )
-        return self._noisy(angle, flux, error, seed, incidence=0.0, way="transmitted", plane="in-plane", sample=False)
+        return bare_scan(self.bench, self._counter, angle, wavelength=self.wavelength, rays=rays, seed=seed)
 
     def measure(
         self,
@@ -246,26 +225,10 @@ class ScatterGoniometer:
         UnknownNameError
             If there is no such plane, way or method.
         """
-        if method not in get_args(Method):
-            raise UnknownNameError("method", method, get_args(Method))
         if plane not in get_args(Plane):
             raise UnknownNameError("plane", plane, get_args(Plane))
         way = _way(bsdf, way)
-        _require_incidence(theta)
-        angle = even_angles(theta if plane == "in-plane" else 0.0, step, span)
-        # Beyond, the detector stands on the other side of the sample.
-        angle = angle[np.abs(angle) < 90.0]
-        behind = way == "transmitted"
-        arms = detector_directions(angle, theta, plane, behind=behind)
-        notes: tuple[str, ...] = ()
-        if method == "trace" and not fresh and self.photons is None:
-            notes = (SHARED,)
-        shadowed = self._shadowed(arms, theta)
-        if shadowed.any():
-            notes = (*notes, _left_out(shadowed))
-            angle, arms = angle[~shadowed], arms[~shadowed]
-        flux, error = self._flux(bsdf, arms, theta, rays, seed, method, behind=behind, fresh=fresh)
-        return self._noisy(angle, flux, error, seed, incidence=theta, way=way, plane=plane, sample=True, notes=notes)
+        return self._measurement(bsdf, theta, rays, seed, method, fresh=fresh).scan(plane, step, span, way)
 
     def flux_at(
         self,
@@ -300,20 +263,11 @@ class ScatterGoniometer:
         >>> (flux / goniometer.solid_angle).round(4).tolist()  # 0.5 cosθ / π
         [0.1591, 0.0955]
         """
-        if method not in get_args(Method):
-            raise UnknownNameError("method", method, get_args(Method))
-        _require_incidence(theta)
+        measurement = self._measurement(bsdf, theta, rays, seed, method)
         arms = as_numbers(directions, "directions", "unit vectors, shape (n, 3)")
         if arms.ndim != 2 or arms.shape[1] != 3 or not (np.abs(np.einsum("ij,ij->i", arms, arms) - 1.0) < 1e-6).all():
             raise ArgumentError("directions are unit vectors, shape (n, 3)")
-        flux, error = np.zeros(len(arms)), np.zeros(len(arms))
-        for behind in (False, True):
-            own = np.flatnonzero((arms[:, 2] < 0.0) == behind)
-            if not own.size:
-                continue
-            found = self._flux(bsdf, arms[own], theta, rays, seed, method, behind=behind, fresh=False)
-            flux[own], error[own] = found
-        return flux, error
+        return measurement.flux_on_both_sides(arms)
 
     def measure_hemisphere(
         self,
@@ -337,22 +291,8 @@ class ScatterGoniometer:
             of the detector stands in the beam.
         """
         way = _way(bsdf, way)
-        behind = way == "transmitted"
         grid = hemisphere(step)
-        flat = direction(grid.radial[None, :], grid.azimuth[:, None], behind=behind).reshape(-1, 3)
-        flux, error = self.flux_at(bsdf, flat, theta, rays, seed, method=method)
-        flux, error = self._with_noise(flux, error, seed)
-        per = self.solid_angle * np.abs(flat[:, 2])
-        flux[self._shadowed(flat, theta)] = np.nan
-        shape = grid.shape
-        return BsdfSlice(
-            light_from(theta, 180.0),
-            (flux / per).reshape(shape),
-            behind,
-            grid=grid,
-            wavelength=self.wavelength,
-            standard_error=(error / per).reshape(shape),
-        )
+        return self._measurement(bsdf, theta, rays, seed, method).slice_on(grid, way)
 
     def measure_directions(
         self,
@@ -390,29 +330,8 @@ class ScatterGoniometer:
         ArgumentError, UnknownNameError
             As of `measure`; if directions are no unit vectors, or none is left.
         """
-        if method not in get_args(Method):
-            raise UnknownNameError("method", method, get_args(Method))
-        _require_incidence(theta)
-        sample = TurnedSample(bsdf, turn) if turn else bsdf
-        arms = np.array(directions, np.float64)
-        checked = DirectionalScan(arms, np.zeros(len(arms)), incidence=theta)
-        shadowed = self._shadowed(arms, theta)
-        notes = [] if method != "trace" or fresh or self.photons is not None else [SHARED]
-        if shadowed.any():
-            notes.append(_left_out(shadowed))
-            arms = arms[~shadowed]
-        flux, error = self._flux(sample, arms, theta, rays, seed, method, behind=checked.behind, fresh=fresh)
-        flux, error = self._with_noise(flux, error, seed)
-        return DirectionalScan(
-            arms,
-            flux,
-            error,
-            solid_angle=self.solid_angle,
-            incidence=theta,
-            background=0.0 if self.photons is None else self.dark / self.photons,
-            bench=self.bench,
-            notes=tuple(notes),
-        )
+        measurement = self._measurement(bsdf, theta, rays, seed, method, turn=turn, fresh=fresh)
+        return measurement.directional_scan(np.array(directions, np.float64))
 
     def measure_window(
         self,
@@ -450,95 +369,36 @@ class ScatterGoniometer:
             As of `measure`.
         """
         behind = _way(bsdf, way) == "transmitted"
-        _require_incidence(theta)
+        measurement = self._measurement(bsdf, theta, rays, seed, method, turn=turn, fresh=fresh)
         arms = window(theta, step, span, behind=behind)
         if outside is not None:
             arms = np.concatenate([arms, hemisphere_around(theta, outside, span + 0.5 * step, behind=behind)])
-        return self.measure_directions(bsdf, arms, theta, rays, seed, turn=turn, method=method, fresh=fresh)
+        return measurement.directional_scan(arms)
 
-    @property
-    def _shadow(self) -> float:
-        """Sine of the angle from the incident beam within which the head of the detector is in it; 0: it has no head."""
-        return 0.5 * (self.head_diameter + self.beam_diameter) / self.distance if self.head_diameter else 0.0
-
-    def _shadowed(self, arms: Array, theta: float) -> npt.NDArray[np.bool_]:
-        """At which positions the head of the detector stands in the beam, shape (n,)."""
-        if not self._shadow:
-            return np.zeros(len(arms), bool)
-        return np.asarray(arms @ light_from(theta, 180.0) > np.cos(np.arcsin(min(self._shadow, 1.0))))
-
-    def _flux(
+    def _measurement(
         self,
-        bsdf: Bsdf | None,
-        arms: Array,
+        bsdf: Bsdf,
         theta: float,
         rays: int,
         seed: int,
         method: Method,
         *,
-        behind: bool,
-        fresh: bool,
-    ) -> tuple[Array, Array]:
-        """Share of the beam in the aperture at positions, and its error; shapes (k,). Without a sample it is traced."""
-        if bsdf is None or method == "trace":
-            return counted_flux(
-                self.bench, bsdf, arms, rays, seed, theta=theta, wavelength=self.wavelength, behind=behind, fresh=fresh
-            )
-        return integrated_flux(self.bench, bsdf, arms, theta=theta, wavelength=self.wavelength, behind=behind)
-
-    # --- the detector ------------------------------------------------------------------------------------------------
-
-    def _with_noise(self, flux: Array, error: Array, seed: int) -> tuple[Array, Array]:
-        drifted = 1.0 + self.drift * np.linspace(0.0, 1.0, flux.size)
-        flux, error = flux * drifted, error * drifted
-        if self.photons is None:
-            return flux, error
-        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 2))))
-        counts = rng.poisson(np.maximum(flux, 0.0) * self.photons + self.dark).astype(np.float64)
-        noise = np.sqrt(np.maximum(counts, 1.0)) / self.photons
-        return (counts - self.dark) / self.photons, np.hypot(error, noise)
-
-    def _noisy(
-        self,
-        angle: Array,
-        flux: Array,
-        error: Array,
-        seed: int,
-        *,
-        incidence: float,
-        way: Way,
-        plane: Plane,
-        sample: bool,
-        notes: tuple[str, ...] = (),
-    ) -> GoniometerScan:
-        flux, error = self._with_noise(flux, error, seed)
-        if self.aperture == "square":
-            notes = (*notes, SQUARE)
-        return GoniometerScan(
-            angle,
-            flux,
-            error,
-            solid_angle=self.solid_angle,
-            incidence=incidence,
-            way=way,
-            plane=plane,
-            background=0.0 if self.photons is None else self.dark / self.photons,
-            sample=sample,
-            notes=notes,
+        turn: float = 0.0,
+        fresh: bool = False,
+    ) -> Measurement:
+        """Of a sample that is turned about its normal [°]."""
+        return Measurement(
+            bench=self.bench,
+            head=self._head,
+            counter=self._counter,
+            wavelength=self.wavelength,
+            bsdf=TurnedSample(bsdf, turn) if turn else bsdf,
+            theta=theta,
+            rays=rays,
+            seed=seed,
+            method=method,
+            fresh=fresh,
         )
-
-
-def _left_out(shadowed: npt.NDArray[np.bool_]) -> str:
-    """What is to be told of positions in the shadow of the head."""
-    if shadowed.all():
-        raise ArgumentError("the head of the detector stands in the beam at all positions")
-    return f"{int(shadowed.sum())} positions are left out: the head of the detector stands in the beam there"
-
-
-def _require_incidence(theta: float) -> None:
-    require_number(theta, "theta", "an angle of incidence from 0 to below 90°")
-    if not 0.0 <= theta < 90.0:
-        raise ArgumentError(f"an angle of incidence of {theta:g}°; give 0 to below 90°")
 
 
 def _way(bsdf: Bsdf, way: Way | None) -> Way:
