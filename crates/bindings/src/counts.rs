@@ -6,10 +6,10 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::carrier::Part;
 use crate::run::interruptible;
 use crate::scan::account_dict;
 use crate::source::with_source;
-use crate::surface::Part;
 
 /// Σ w and Σ w² per cell as arrays; numbers and None if all weights are equal.
 fn sums(py: Python<'_>, sums: Sums) -> (Bound<'_, PyAny>, Option<Bound<'_, PyArray1<f64>>>) {

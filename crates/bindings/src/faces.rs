@@ -6,8 +6,8 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::carrier::vectors;
 use crate::scene_values::{form, frame_of, refuse};
-use crate::surface::vectors;
 
 /// All faces; `rows` is an `etendue.scene.face_rows.FaceRows`.
 pub fn faces(rows: &Bound<'_, PyAny>) -> PyResult<Vec<SceneFace>> {

@@ -11,8 +11,8 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArra
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::carrier::{Part, vectors};
 use crate::run::stoppable;
-use crate::surface::{Part, vectors};
 use crate::view::View;
 
 /// Values at the centres of cells of a grid whose linear interpolation has the means given over the cells.

@@ -4,6 +4,7 @@
 //! between rounds of batches to report progress and to honour Ctrl-C.
 
 mod bsdf;
+mod carrier;
 mod cone;
 mod counts;
 mod dealing;
@@ -25,7 +26,6 @@ mod scene_values;
 mod source;
 mod stored;
 mod subset;
-mod surface;
 mod survey;
 mod trace;
 mod view;
@@ -61,8 +61,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(ray_index::index_arrange, module)?)?;
     module.add_function(wrap_pyfunction!(ray_index::index_sums, module)?)?;
     module.add_function(wrap_pyfunction!(counts::count_rays, module)?)?;
-    module.add_function(wrap_pyfunction!(surface::cross_parts, module)?)?;
-    module.add_function(wrap_pyfunction!(surface::rays_of_part, module)?)?;
+    module.add_function(wrap_pyfunction!(carrier::cross_parts, module)?)?;
+    module.add_function(wrap_pyfunction!(carrier::rays_of_part, module)?)?;
     module.add_function(wrap_pyfunction!(field::node_values, module)?)?;
     module.add_function(wrap_pyfunction!(polya::polya_posterior, module)?)?;
     module.add_function(wrap_pyfunction!(polya::polya_average, module)?)?;

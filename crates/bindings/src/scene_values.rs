@@ -11,7 +11,7 @@ use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::surface::vectors;
+use crate::carrier::vectors;
 
 /// A record as Python hands it over.
 pub type Dict<'a, 'py> = &'a Bound<'py, PyDict>;

@@ -26,12 +26,12 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
+use crate::carrier::vectors;
 use crate::glints::Glints;
 use crate::guide::Guide;
 use crate::run::stoppable;
 use crate::scene::Scene;
 use crate::source::{Opened, Source};
-use crate::surface::vectors;
 use crate::survey::Survey;
 use crate::view::View;
 

@@ -1,6 +1,7 @@
 //! Axis-aligned boxes.
 
 use etendue_math::Vec3;
+use etendue_math::heads::heads;
 use multiversion::multiversion;
 
 /// An axis-aligned box in f64 \[mm\]. A box with a `lo` above its `hi` is empty.
@@ -194,8 +195,8 @@ impl Ball {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn mark(ball: Ball, origin: [&[f64]; 3], direction: [&[f64]; 3], marks: &mut [bool]) {
     let n = marks.len();
-    let [ox, oy, oz] = origin.map(|v| &v[..n]);
-    let [dx, dy, dz] = direction.map(|v| &v[..n]);
+    let [ox, oy, oz] = heads(&origin, n);
+    let [dx, dy, dz] = heads(&direction, n);
     for i in 0..n {
         marks[i] |= ball.meets(Vec3::new(ox[i], oy[i], oz[i]), Vec3::new(dx[i], dy[i], dz[i]));
     }

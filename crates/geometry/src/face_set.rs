@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use etendue_math::heads::{heads, heads_mut};
 use etendue_math::{Frame, Vec3};
 use multiversion::multiversion;
 
@@ -20,10 +21,10 @@ use crate::shape::{Crossing, Outline, Shape};
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn to_local(frame: &Frame, rays: &RayBlock, met: &[f64], scratch: &mut MeshRays) {
     let n = rays.len();
-    let [ox, oy, oz] = rays.origin.each_ref().map(|v| &v[..n]);
-    let [dx, dy, dz] = rays.direction.each_ref().map(|v| &v[..n]);
-    let [px, py, pz] = scratch.origin.each_mut().map(|v| &mut v[..n]);
-    let [kx, ky, kz] = scratch.direction.each_mut().map(|v| &mut v[..n]);
+    let [ox, oy, oz] = heads(&rays.origin, n);
+    let [dx, dy, dz] = heads(&rays.direction, n);
+    let [px, py, pz] = heads_mut(&mut scratch.origin, n);
+    let [kx, ky, kz] = heads_mut(&mut scratch.direction, n);
     let (met, reach) = (&met[..n], &mut scratch.t[..n]);
     for i in 0..n {
         let (o, d) = (Vec3::new(ox[i], oy[i], oz[i]), Vec3::new(dx[i], dy[i], dz[i]));

@@ -1,6 +1,7 @@
 //! What the rays of a block meet first.
 
 use etendue_math::Vec3;
+use etendue_math::heads::heads;
 use multiversion::multiversion;
 
 use crate::origin_faces::{MOST_ORIGIN_FACES, NONE};
@@ -98,7 +99,7 @@ fn find_ties(hits: &Hits, rays: &RayBlock, out: &mut Vec<bool>) {
     let n = rays.len();
     out.resize(n, false);
     let out = &mut out[..n];
-    let [x, y, z] = rays.origin.each_ref().map(|v| &v[..n]);
+    let [x, y, z] = heads(&rays.origin, n);
     let (first, second) = (&hits.t[..n], &hits.second[..n]);
     for i in 0..n {
         out[i] = second[i] - first[i] <= TIE * (x[i].abs() + y[i].abs() + z[i].abs() + first[i]);

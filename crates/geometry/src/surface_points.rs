@@ -1,5 +1,6 @@
 //! The points at which many rays meet one face, and the normals there, several at a time.
 
+use etendue_math::heads::{heads, heads_mut};
 use etendue_math::{Frame, Vec3};
 use multiversion::multiversion;
 
@@ -88,9 +89,9 @@ fn surface_points_in_planes(
     heights: &[f64],
 ) {
     let n = t.len();
-    let [px, py, pz] = points.each_mut().map(|v| &mut v[..n]);
-    let [dx, dy, dz] = directions.each_ref().map(|v| &v[..n]);
-    let [nx, ny, nz] = normals.each_mut().map(|v| &mut v[..n]);
+    let [px, py, pz] = heads_mut(points, n);
+    let [dx, dy, dz] = heads(directions, n);
+    let [nx, ny, nz] = heads_mut(normals, n);
     let (heights, frame) = (&heights[..n], &face.frame);
     let sign = if face.flipped { -1.0 } else { 1.0 };
     for i in 0..n {
@@ -139,9 +140,9 @@ fn surface_points_on<S: Settled>(
     normals: &mut Vectors,
 ) {
     let n = t.len();
-    let [px, py, pz] = points.each_mut().map(|v| &mut v[..n]);
-    let [dx, dy, dz] = directions.each_ref().map(|v| &v[..n]);
-    let [nx, ny, nz] = normals.each_mut().map(|v| &mut v[..n]);
+    let [px, py, pz] = heads_mut(points, n);
+    let [dx, dy, dz] = heads(directions, n);
+    let [nx, ny, nz] = heads_mut(normals, n);
     let sign = if face.flipped { -1.0 } else { 1.0 };
     for i in 0..n {
         let (o, d) = (Vec3::new(px[i], py[i], pz[i]), Vec3::new(dx[i], dy[i], dz[i]));

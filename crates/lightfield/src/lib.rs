@@ -3,17 +3,15 @@
 //! `view`: an observer and his pixel grid. `cone`: rays that point into a cone about the line to the observer, pixel by
 //! pixel (thesis chapter 2). `ray_index`: rays in an order in which those that a cone can see stand together.
 //!
-//! `surface`: carrier surfaces of light fields and coordinates on them; `leave`: which lines meet one at all. `field`: light
-//! fields; `counts`: rays counted in their cells; `polya`: counts on a dyadic grid, smoothed by averaging over all its
-//! partitions.
+//! `carrier`: surfaces that light fields live on, and coordinates on them. `field`: light fields; `counts`: rays counted in
+//! their cells; `polya`: counts on a dyadic grid, smoothed by averaging over all its partitions.
 
+pub mod carrier;
 pub mod cone;
 pub mod counts;
 pub mod field;
-pub mod leave;
 pub mod polya;
 pub mod ray_index;
-pub mod surface;
 pub mod view;
 
 pub use view::View;

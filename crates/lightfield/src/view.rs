@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use etendue_geometry::bounds::Bounds;
 use etendue_math::Vec3;
+use etendue_math::heads::heads_mut;
 use multiversion::multiversion;
 
 /// A pixel grid in space, seen from a point. Lengths in mm.
@@ -157,7 +158,7 @@ impl View {
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 fn through_all(view: &View, [across, down]: &[Vec<f64>; 2], directions: &mut [Vec<f64>; 3]) {
     let n = across.len();
-    let (down, [x, y, z]) = (&down[..n], directions.each_mut().map(|list| &mut list[..n]));
+    let (down, [x, y, z]) = (&down[..n], heads_mut(directions, n));
     for i in 0..n {
         let d = view.through([across[i], down[i]]);
         (x[i], y[i], z[i]) = (d.x, d.y, d.z);

@@ -1,6 +1,7 @@
 //! Numbers and vectors: f64, no I/O, no state.
 //!
-//! `vector`: points and directions. `frame`: where something stands and how it is turned. `interval`: bounds of a function.
+//! `vector`: points and directions. `frame`: where something stands and how it is turned. `heads`: the first entries of several
+//! lists. `interval`: bounds of a function.
 //! `polynomial`: by Horner's rule. `trig` and `special`: sine, cosine, arc tangent, exponential, logarithm and ln Γ that give the
 //! same bits on every platform.
 
@@ -8,6 +9,7 @@
 mod polynomial;
 
 pub mod frame;
+pub mod heads;
 pub mod interval;
 pub mod special;
 pub mod trig;

@@ -1,8 +1,8 @@
 //! Sources as they are seen: their luminance along a line, and points on them to connect to.
 
 use etendue_geometry::bounds::Ball;
+use etendue_lightfield::carrier::Sights;
 use etendue_lightfield::field::{LightField, PartField, SightReader, SightReading};
-use etendue_lightfield::leave::Sights;
 use etendue_math::Vec3;
 use etendue_sampling::alias::Alias;
 

@@ -12,7 +12,7 @@ use etendue_math::Vec3;
 use super::light_field::{PartField, Reading};
 use super::pixel_sums::{PixelSums, lattice_error};
 use super::points::Points;
-use crate::surface::{CarrierPart, Coordinates, carry};
+use crate::carrier::{CarrierPart, Coordinates, carry};
 use crate::view::View;
 
 /// Pixels across which a part is small.
@@ -172,9 +172,9 @@ fn aim(view: &View, place: [f64; 2], i: usize, batch: &mut RayBatch) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::carrier::{Disk, Focus, Hemisphere, Rectangle, Shape, Tube};
     use crate::field::factor::Factor;
     use crate::field::light_field::tests::rough;
-    use crate::surface::{Focus, Shape};
 
     fn view(columns: u32, rows: u32) -> View {
         let observer = Vec3::new(120.0, -80.0, 300.0);
@@ -214,11 +214,11 @@ mod tests {
     fn outline(view: &View, part: &CarrierPart, turns: usize) -> f64 {
         let place = |i: usize| {
             let point = match part.shape {
-                Shape::Rectangle { .. } => {
+                Shape::Rectangle(_) => {
                     part.ray([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]][i % 4], [0.5; 2])
                         .0
                 }
-                Shape::Disk { radius } => {
+                Shape::Disk(Disk { radius }) => {
                     let (sine, cosine) = (i as f64 / turns as f64 * std::f64::consts::TAU).sin_cos();
                     part.frame
                         .point_to_world(Vec3::new(radius * cosine, radius * sine, 0.0))
@@ -239,22 +239,22 @@ mod tests {
     #[test]
     fn small_parts_bring_all_their_light_into_any_grid() {
         let flat = Focus::default();
-        let thin = Shape::Rectangle {
+        let thin = Shape::Rectangle(Rectangle {
             width: 9.0,
             height: 1e-4,
             focus: flat,
-        };
-        let narrow = Shape::Rectangle {
+        });
+        let narrow = Shape::Rectangle(Rectangle {
             width: 1e-3,
             height: 4.0,
             focus: flat,
-        };
-        let rectangle = Shape::Rectangle {
+        });
+        let rectangle = Shape::Rectangle(Rectangle {
             width: 0.7,
             height: 0.4,
             focus: flat,
-        };
-        let disk = Shape::Disk { radius: 0.3 };
+        });
+        let disk = Shape::Disk(Disk { radius: 0.3 });
         for (shape, turns) in [(thin, 4), (narrow, 4), (rectangle, 4), (disk, 4000)] {
             let field = even(shape);
             for (columns, rows) in [(1, 1), (7, 5), (30, 20)] {
@@ -281,17 +281,17 @@ mod tests {
     fn all_of_a_part_is_within_its_footprint() {
         let focus = Focus([0.4, -1.3, 2.1, -0.6]);
         let shapes = [
-            Shape::Rectangle {
+            Shape::Rectangle(Rectangle {
                 width: 2.0,
                 height: 1.0,
                 focus,
-            },
-            Shape::Disk { radius: 1.2 },
-            Shape::Hemisphere { radius: 0.8 },
-            Shape::Tube {
+            }),
+            Shape::Disk(Disk { radius: 1.2 }),
+            Shape::Hemisphere(Hemisphere { radius: 0.8 }),
+            Shape::Tube(Tube {
                 radius: 0.6,
                 height: 2.0,
-            },
+            }),
         ];
         let view = view(60, 40);
         for shape in shapes {
@@ -318,7 +318,7 @@ mod tests {
 
     #[test]
     fn what_is_not_before_the_observer_has_none() {
-        let mut part = even(Shape::Disk { radius: 1.0 }).part;
+        let mut part = even(Shape::Disk(Disk { radius: 1.0 })).part;
         part.frame.origin = view(1, 1).observer;
         assert!(Footprint::of(&part, &view(1, 1)).is_none());
     }

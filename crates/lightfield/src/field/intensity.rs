@@ -11,7 +11,7 @@ use etendue_sampling::ordered;
 
 use super::light_field::{LightField, PartField, stopped};
 use super::points::Points;
-use crate::surface::{Coordinates, carry};
+use crate::carrier::{Coordinates, carry};
 
 /// I(k) = Σ ∫ L(x, k) (n·k) dA over the parts, for each direction: a midpoint rule of `side`² points on every part.
 ///
@@ -111,8 +111,9 @@ fn of_part(field: &PartField, places: &Places, k: Vec3, scratch: &mut Scratch) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::carrier::Shape;
+    use crate::carrier::tests::zoo;
     use crate::field::{Factor, FineErrors};
-    use crate::surface::tests::zoo;
 
     #[test]
     fn a_part_of_constant_luminance_has_the_intensity_of_its_projected_area() {
@@ -133,12 +134,10 @@ mod tests {
             let found = intensity(&LightField { parts: vec![field] }, &[[k.x, k.y, k.z]], 200, 2, None)[0];
             let expected = 3.0
                 * match part.shape {
-                    crate::surface::Shape::Rectangle { width, height, .. } => width * height * theta.cos(),
-                    crate::surface::Shape::Disk { .. } => part.area() * theta.cos(),
-                    crate::surface::Shape::Hemisphere { radius } => {
-                        std::f64::consts::PI * radius * radius * (1.0 + theta.cos()) / 2.0
-                    }
-                    crate::surface::Shape::Tube { radius, height } => 2.0 * radius * height * theta.sin(),
+                    Shape::Rectangle(r) => r.width * r.height * theta.cos(),
+                    Shape::Disk(_) => part.area() * theta.cos(),
+                    Shape::Hemisphere(h) => std::f64::consts::PI * h.radius * h.radius * (1.0 + theta.cos()) / 2.0,
+                    Shape::Tube(t) => 2.0 * t.radius * t.height * theta.sin(),
                 };
             assert!((found / expected - 1.0).abs() < 2e-3, "{part:?}: {found} {expected}");
         }

@@ -7,7 +7,7 @@ use etendue_math::Vec3;
 use super::errors::FineErrors;
 use super::factor::{Factor, next_to};
 use super::tent::Tent;
-use crate::surface::CarrierPart;
+use crate::carrier::CarrierPart;
 
 /// The light that leaves one part.
 #[derive(Clone, Debug)]
@@ -161,7 +161,7 @@ pub(super) fn stopped(stop: Option<&AtomicBool>) -> bool {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::surface::tests::{lattice, zoo};
+    use crate::carrier::tests::{lattice, zoo};
 
     /// One part of each shape with a rough ratio and rough factors, on grids of different sizes.
     pub(crate) fn rough(kind: usize) -> PartField {

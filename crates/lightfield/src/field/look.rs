@@ -14,7 +14,8 @@ use super::footprint::{Footprint, add_small};
 use super::light_field::{LightField, PartField, Reading, stopped};
 use super::pixel_sums::{PixelSums, lattice_error};
 use super::points::Points;
-use crate::surface::{Coordinates, carry};
+use super::tile::{Tile, aim};
+use crate::carrier::{Coordinates, carry};
 use crate::view::View;
 
 /// How many times as many points there are in pixels where they differ much.
@@ -148,52 +149,6 @@ fn wants_more(view: &View, map: &[Reading], off: &[f64], points: usize, pixel: u
     points > 1 && left > (LEFT[0] * deviation).max(LEFT[1] * value)
 }
 
-/// Some pixels beside and above one another: they see parts of the tables that lie together, whichever way the rows of these
-/// run over the picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Tile {
-    row: usize,
-    column: usize,
-    rows: usize,
-    columns: usize,
-}
-
-impl Tile {
-    /// The tiles of a view, of so many pixels at most.
-    fn all(view: &View, most: usize) -> Vec<Self> {
-        let [rows, columns] = [view.rows as usize, view.columns as usize];
-        let tall = rows.min(1 << (most.ilog2() / 2));
-        let wide = columns.min(most / tall);
-        let mut tiles = Vec::with_capacity(rows.div_ceil(tall) * columns.div_ceil(wide));
-        for row in (0..rows).step_by(tall) {
-            for column in (0..columns).step_by(wide) {
-                tiles.push(Self {
-                    row,
-                    column,
-                    rows: tall.min(rows - row),
-                    columns: wide.min(columns - column),
-                });
-            }
-        }
-        tiles
-    }
-
-    /// One pixel.
-    const fn alone(view: &View, pixel: usize) -> Self {
-        let columns = view.columns as usize;
-        Self {
-            row: pixel / columns,
-            column: pixel % columns,
-            rows: 1,
-            columns: 1,
-        }
-    }
-
-    const fn pixels(&self) -> usize {
-        self.rows * self.columns
-    }
-}
-
 /// Room for the points of some pixels.
 #[derive(Default)]
 struct Scratch {
@@ -281,26 +236,6 @@ fn average(
     }
 }
 
-/// The lines from the points of the pixels of a tile to the observer: compiled for each instruction set.
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn aim(view: &View, tile: Tile, points: &[[f64; 2]], batch: &mut RayBatch) {
-    batch.len = tile.pixels() * points.len();
-    let [x, y, z] = batch.position.each_mut().map(|v| v.chunks_exact_mut(points.len()));
-    let [kx, ky, kz] = batch.direction.each_mut().map(|v| v.chunks_exact_mut(points.len()));
-    for (pixel, (((x, y), z), ((kx, ky), kz))) in (0..tile.pixels()).zip(x.zip(y).zip(z).zip(kx.zip(ky).zip(kz))) {
-        let row = (tile.row + pixel / tile.columns) as f64;
-        let column = (tile.column + pixel % tile.columns) as f64;
-        let places = x.iter_mut().zip(y).zip(z);
-        let directions = kx.iter_mut().zip(ky).zip(kz);
-        for ((((x, y), z), ((kx, ky), kz)), [du, dv]) in places.zip(directions).zip(points) {
-            let point = view.point([column + du, row + dv]);
-            let k = (view.observer - point).normalized();
-            (*x, *y, *z) = (point.x, point.y, point.z);
-            (*kx, *ky, *kz) = (k.x, k.y, k.z);
-        }
-    }
-}
-
 /// Luminance along lines given by points and directions; 0 once `stop` is set.
 #[must_use]
 pub fn along(
@@ -360,10 +295,10 @@ const fn gcd(a: u32, b: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::carrier::{Focus, Rectangle, Shape};
     use crate::field::errors::Averaging;
     use crate::field::factor::Factor;
     use crate::field::light_field::tests::rough;
-    use crate::surface::{Focus, Shape};
     use etendue_math::Frame;
 
     fn view() -> View {
@@ -429,11 +364,11 @@ mod tests {
     fn edges_between_the_points_of_pixels_are_seen() {
         // An even square that reaches a fiftieth of a pixel beyond the edges of others, seen from far above.
         let mut part = rough(0);
-        part.part.shape = Shape::Rectangle {
+        part.part.shape = Shape::Rectangle(Rectangle {
             width: 2.04,
             height: 1.04,
             focus: Focus::default(),
-        };
+        });
         part.part.frame = Frame {
             origin: Vec3::default(),
             x: Vec3::new(1.0, 0.0, 0.0),
@@ -464,34 +399,6 @@ mod tests {
                 let error = (reading.value - 2.0 * x * y).abs();
                 assert!(error < 3.0 * reading.deviation + 0.01, "{error} {reading:?}");
             }
-        }
-    }
-
-    #[test]
-    fn tiles_cover_each_pixel_once() {
-        for (columns, rows, most) in [
-            (40, 30, 128),
-            (1, 1, 128),
-            (1, 500, 128),
-            (500, 1, 128),
-            (7, 5, 1),
-            (33, 9, 2048),
-        ] {
-            let view = View {
-                columns,
-                rows,
-                ..view()
-            };
-            let mut seen = vec![0; view.pixels()];
-            for tile in Tile::all(&view, most) {
-                assert!(tile.pixels() <= most);
-                for row in tile.row..tile.row + tile.rows {
-                    for column in tile.column..tile.column + tile.columns {
-                        seen[row * columns as usize + column] += 1;
-                    }
-                }
-            }
-            assert!(seen.iter().all(|n| *n == 1));
         }
     }
 

@@ -17,6 +17,7 @@ mod pixel_sums;
 mod points;
 mod sights;
 pub mod tent;
+mod tile;
 mod under_tents;
 
 pub use errors::{Averaging, FineErrors};

@@ -5,12 +5,13 @@
 //! while others are worked on. Either way each point gets the same bits as by itself.
 
 use etendue_geometry::ray_batch::BLOCK;
+use etendue_math::heads::heads_mut;
 use multiversion::multiversion;
 
 use super::factor::groups;
 use super::light_field::{PartField, Reading, joined, weighed};
 use super::tent::Tents;
-use crate::surface::Coordinates;
+use crate::carrier::Coordinates;
 
 /// What is found at up to [`BLOCK`] points.
 pub struct Points {
@@ -101,8 +102,8 @@ struct Found<'a> {
 fn read_some(scratch: &mut Scratch, part: &PartField, [s1, s2, a, b]: [&[f64]; 4], found: Found<'_>) {
     let n = found.value.len();
     let Scratch { tents, factors, errors } = scratch;
-    let [space, direction] = factors.each_mut().map(|values| &mut values[..n]);
-    let [of_place, of_direction] = errors.each_mut().map(|values| &mut values[..n]);
+    let [space, direction] = heads_mut(factors, n);
+    let [of_place, of_direction] = heads_mut(errors, n);
     let [x, y, ..] = &mut *tents;
     part.space.fill([s1, s2], [x, y], space);
     part.direction.fill([a, b], [x, y], direction);
@@ -143,9 +144,9 @@ fn read_some(scratch: &mut Scratch, part: &PartField, [s1, s2, a, b]: [&[f64]; 4
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::carrier::tests::lattice;
     use crate::field::Factor;
     use crate::field::light_field::tests::rough;
-    use crate::surface::tests::lattice;
 
     #[test]
     fn each_point_is_read_as_by_itself_whether_it_shares_its_cells_or_not() {

@@ -2,20 +2,21 @@
 
 use etendue_geometry::RayBatch;
 use etendue_geometry::ray_batch::BLOCK;
+use etendue_math::heads::heads_mut;
 use etendue_math::{Frame, Vec3};
 use multiversion::multiversion;
 
 use super::light_field::{PartField, Reading};
 use super::points::Points;
-use crate::leave::{Departures, Sights};
-use crate::surface::{Coordinates, carry};
+use crate::carrier::{Coordinates, carry};
+use crate::carrier::{Departures, Sights};
 
 /// What a line of sight sees of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SightReading {
     /// Distance along the line \[mm\].
     pub t: f64,
-    /// The cosine under which the area is seen (see [`CarrierPart::leaves`](crate::surface::CarrierPart::leaves)).
+    /// The cosine under which the area is seen (see [`CarrierPart::leaves`](crate::carrier::CarrierPart::leaves)).
     pub cosine: f64,
     /// The place on the part's chart.
     pub place: [f64; 2],
@@ -87,8 +88,8 @@ fn gather(into: &mut [f64], from: &[f64], which: &[u32]) {
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 fn turn_back(frame: &Frame, lines: &mut RayBatch) {
     let n = lines.len;
-    let [px, py, pz] = lines.position.each_mut().map(|v| &mut v[..n]);
-    let [kx, ky, kz] = lines.direction.each_mut().map(|v| &mut v[..n]);
+    let [px, py, pz] = heads_mut(&mut lines.position, n);
+    let [kx, ky, kz] = heads_mut(&mut lines.direction, n);
     for i in 0..n {
         let p = frame.point_to_local(Vec3::new(px[i], py[i], pz[i]));
         let k = -frame.direction_to_local(Vec3::new(kx[i], ky[i], kz[i]));
@@ -100,8 +101,8 @@ fn turn_back(frame: &Frame, lines: &mut RayBatch) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::carrier::leave::tests::SomeSights;
     use crate::field::light_field::tests::rough;
-    use crate::leave::tests::SomeSights;
 
     #[test]
     fn each_line_sees_what_it_sees_by_itself() {

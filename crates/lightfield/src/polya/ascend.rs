@@ -7,8 +7,8 @@ use super::array::{Array, Workspace};
 use super::base::Splits;
 use super::chunk::{Busy, CHUNK};
 use super::data::Data;
-use super::grid::Level;
 use super::kernel::{SPLIT, Trial, add_log_bayes, add_log_gamma, join, log_gamma, whole_term, write_split};
+use super::level::Level;
 use super::sweep::{Place, Problem, Scratch, add, cut, each, effective_counts, sum_chunk, sum_tile};
 
 /// What the sweep leaves behind.

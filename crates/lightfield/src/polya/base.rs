@@ -5,7 +5,8 @@ use multiversion::multiversion;
 
 use super::chunk::{Busy, GROUP};
 use super::data::Masses;
-use super::grid::{Grid, Level, Step};
+use super::grid::Grid;
+use super::level::{Level, Step};
 
 /// A base measure over the cells of a grid: a product of factors, each over some neighbouring axes.
 #[derive(Clone, Debug)]

@@ -6,8 +6,8 @@ use rayon::ThreadPool;
 use super::array::{Array, Workspace};
 use super::ascend::Evidence;
 use super::chunk::CHUNK;
-use super::grid::Level;
 use super::kernel::{Flow, add_flow};
+use super::level::Level;
 use super::sweep::{Place, Problem, Scratch, cut, each, effective_counts, sum_tile};
 
 /// Mean and mean square of what reaches a box, and of what has stopped at the box or above it and is handed on to its first

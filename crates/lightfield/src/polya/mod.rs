@@ -18,6 +18,7 @@ mod data;
 mod descend;
 mod grid;
 mod kernel;
+mod level;
 mod posterior;
 mod sweep;
 

@@ -12,7 +12,8 @@ use rayon::prelude::*;
 use super::base::{Base, SplitTerms};
 use super::chunk::{Busy, CHUNK};
 use super::data::Data;
-use super::grid::{Grid, Level, Span};
+use super::grid::Grid;
+use super::level::{Level, Span};
 
 /// A tree to be grown.
 pub(super) struct Problem<'a> {

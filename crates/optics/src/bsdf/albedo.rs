@@ -1,18 +1,11 @@
 //! Shares of light that leave a surface, tabled over the direction of incidence.
 
-use etendue_math::special::cube_root;
 use std::f64::consts::FRAC_PI_2;
 
 use etendue_math::Vec3;
+use etendue_math::special::cube_root;
 
-/// Nodes and weights of the rule of Gauss and Legendre from 0 to 1.
-pub const GAUSS: [(f64, f64); 5] = [
-    (0.046_910_077_030_668, 0.118_463_442_528_094_54),
-    (0.230_765_344_947_158_45, 0.239_314_335_249_683_24),
-    (0.5, 0.284_444_444_444_444_45),
-    (0.769_234_655_052_841_5, 0.239_314_335_249_683_24),
-    (0.953_089_922_969_332, 0.118_463_442_528_094_54),
-];
+use super::gauss::GAUSS;
 
 /// Parts of a quarter turn for which shares that depend on azimuth are tabled.
 const TURNS: usize = 16;

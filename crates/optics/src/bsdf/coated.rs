@@ -7,7 +7,8 @@ use etendue_math::Vec3;
 use etendue_math::special::ln;
 use etendue_sampling::more_numbers::MoreNumbers;
 
-use super::contract::{Bsdf, Facts, Media, Parameters, Parts, Product, Shares, by_cosine};
+use super::contract::{Bsdf, Facts, Media, Parameters, Parts, Product, by_cosine};
+use super::shares::Shares;
 use crate::fresnel::fresnel;
 use crate::table::Table;
 
@@ -170,7 +171,7 @@ impl Product for Coated {
 }
 
 #[cfg(test)]
-impl super::contract::Examples for Coated {
+impl super::examples::Examples for Coated {
     const MEDIA: bool = true;
 
     fn examples() -> Vec<Self> {

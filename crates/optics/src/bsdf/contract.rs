@@ -31,6 +31,8 @@ use etendue_math::Vec3;
 use etendue_math::trig::sin_cos_turns;
 use etendue_sampling::warp::part_of;
 
+use super::drawn::{Drawn, Outcome};
+use super::shares::{Component, Shares};
 use crate::table::Table;
 
 /// What lies on both sides of a surface, for light of one wavelength.
@@ -54,84 +56,6 @@ impl Media {
         } else {
             [self.back, self.front]
         }
-    }
-}
-
-/// A component of the light that leaves a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Component {
-    /// Mirrored (`false`), or refracted by Snell's law, which is straight on between equal media (`true`).
-    Specular(bool),
-    /// Scattered back (`false`), or to the other side (`true`).
-    Diffuse(bool),
-}
-
-impl Component {
-    /// In the order in which they are drawn.
-    pub const ALL: [Self; 4] = [
-        Self::Specular(false),
-        Self::Specular(true),
-        Self::Diffuse(false),
-        Self::Diffuse(true),
-    ];
-
-    /// Whether the light goes on in a single direction.
-    #[must_use]
-    pub const fn is_specular(self) -> bool {
-        matches!(self, Self::Specular(_))
-    }
-
-    /// Whether the light passes to the other side.
-    #[must_use]
-    pub const fn is_transmitted(self) -> bool {
-        matches!(self, Self::Specular(true) | Self::Diffuse(true))
-    }
-}
-
-/// Shares of the arriving flux that leave, reflected and transmitted; what they lack to 1 is absorbed.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Shares {
-    /// In a single direction.
-    pub specular: [f64; 2],
-    /// In all directions of a side: the directional-hemispherical shares.
-    pub diffuse: [f64; 2],
-    /// Cosine of the angle of refraction: 0 if the light is totally reflected.
-    pub refraction: f64,
-}
-
-impl Shares {
-    /// Of all components together.
-    #[inline]
-    #[must_use]
-    pub fn total(&self) -> f64 {
-        self.specular[0] + self.specular[1] + self.diffuse[0] + self.diffuse[1]
-    }
-
-    /// In the order of [`Component::ALL`].
-    #[inline(always)]
-    #[must_use]
-    pub const fn in_order(&self) -> [f64; 4] {
-        [self.specular[0], self.specular[1], self.diffuse[0], self.diffuse[1]]
-    }
-
-    /// The component that a number from 0 to 1 picks by the shares; None: absorbed. What is left of the number when that is
-    /// known is again spread evenly from 0 to 1.
-    #[inline]
-    #[must_use]
-    pub fn pick(&self, number: f64) -> Option<(Component, f64)> {
-        let shares = self.in_order();
-        let mut sum = 0.0;
-        for (share, component) in shares.iter().zip(Component::ALL) {
-            if number < sum + share {
-                return Some((component, part_of(number - sum, *share)));
-            }
-            sum += share;
-        }
-        // Shares that should add up to 1 may fall short of it by rounding.
-        (sum >= 1.0 - 1e-12).then(|| {
-            let last = shares.iter().rposition(|share| *share > 0.0).unwrap_or(0);
-            (Component::ALL[last], 0.5)
-        })
     }
 }
 
@@ -165,52 +89,6 @@ impl Facts {
     #[must_use]
     pub const fn is_specular(&self) -> bool {
         self.specular[0] || self.specular[1]
-    }
-}
-
-/// What is drawn of a ray at a surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Drawn {
-    /// It is absorbed.
-    Absorbed,
-    /// It is mirrored.
-    Mirrored,
-    /// It is refracted; the cosine of the angle of refraction.
-    Refracted(f64),
-    /// It is scattered in a direction.
-    Scattered(Vec3),
-}
-
-/// What becomes of one of many rays whose directions are kept together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// It is absorbed.
-    Absorbed,
-    /// It is mirrored.
-    Mirrored,
-    /// It is refracted; the third component of its direction is the cosine of the angle of refraction instead.
-    Refracted,
-    /// It is scattered; its direction is the new one.
-    Scattered,
-}
-
-impl Drawn {
-    /// Its direction in the place of that from which the ray came, and what becomes of the ray.
-    pub fn keep(self, directions: &mut Vectors, k: usize) -> Outcome {
-        match self {
-            Self::Absorbed => Outcome::Absorbed,
-            Self::Mirrored => Outcome::Mirrored,
-            Self::Refracted(cosine) => {
-                directions[2][k] = cosine;
-                Outcome::Refracted
-            }
-            Self::Scattered(d) => {
-                for (list, component) in directions.iter_mut().zip([d.x, d.y, d.z]) {
-                    list[k] = component;
-                }
-                Outcome::Scattered
-            }
-        }
     }
 }
 
@@ -495,98 +373,4 @@ pub fn by_cosine(front: bool, [height, turn]: [f64; 2]) -> Vec3 {
     let sine = ((1.0 - cosine) * (1.0 + cosine)).sqrt();
     let (s, c) = sin_cos_turns(turn);
     Vec3::new(sine * c, sine * s, if front { cosine } else { -cosine })
-}
-
-/// A BSDF by name, and how the tests integrate it.
-#[cfg(test)]
-#[derive(Clone, Debug)]
-pub struct Example {
-    /// The name of its file and its number.
-    pub name: String,
-    /// What is tested.
-    pub bsdf: std::sync::Arc<dyn Bsdf>,
-    /// To which the quadrature is right.
-    pub quadrature: f64,
-    /// Whether that is a lattice.
-    pub lattice: bool,
-    /// Whether indices matter.
-    pub media: bool,
-}
-
-/// Some of a kind, for the tests of all kinds.
-#[cfg(test)]
-pub trait Examples: Bsdf + Sized + 'static {
-    /// With all that they can be: constant, dependent on angle, black.
-    fn examples() -> Vec<Self>;
-
-    /// To which the quadrature of the tests is right for them: less for functions with kinks that it does not know.
-    const QUADRATURE: f64 = 1e-6;
-
-    /// Whether that is a lattice over the hemisphere, for functions with edges in unknown places, and not in polar coordinates
-    /// about the specular direction.
-    const LATTICE: bool = false;
-
-    /// Whether the refractive indices on both sides matter.
-    const MEDIA: bool = false;
-
-    /// The same, by the name of their file and their number.
-    fn named(file: &str) -> Vec<Example> {
-        let each = Self::examples().into_iter().enumerate();
-        each.map(|(number, bsdf)| Example {
-            name: format!("{file} {number}"),
-            bsdf: std::sync::Arc::new(bsdf),
-            quadrature: Self::QUADRATURE,
-            lattice: Self::LATTICE,
-            media: Self::MEDIA,
-        })
-        // What is left of a BSDF is one, too.
-        .flat_map(|whole| {
-            let left = whole.bsdf.parts().and_then(|parts| parts.rest.cloned());
-            let left = left.map(|bsdf| Example {
-                name: format!("rest of {}", whole.name),
-                bsdf,
-                ..whole.clone()
-            });
-            std::iter::once(whole).chain(left)
-        })
-        .collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn components_are_picked_by_their_shares_and_the_rest_is_absorbed() {
-        let shares = Shares {
-            specular: [0.1, 0.2],
-            diffuse: [0.3, 0.15],
-            refraction: 1.0,
-        };
-        let n = 100_000;
-        let (mut counts, mut rests) = ([0; 5], [0.0; 5]);
-        for k in 0..n {
-            let picked = shares.pick((f64::from(k) + 0.5) / f64::from(n));
-            let place = picked.map_or(4, |(c, _)| Component::ALL.iter().position(|m| *m == c).expect("known"));
-            rests[place] += picked.map_or(0.0, |(_, rest)| rest);
-            assert!(picked.is_none_or(|(_, rest)| (0.0..1.0).contains(&rest)));
-            counts[place] += 1;
-        }
-        assert_eq!(counts, [10_000, 20_000, 30_000, 15_000, 25_000]);
-        // What is left of the number is even in each of them.
-        for (rest, count) in rests.iter().zip(counts).take(4) {
-            assert!((rest / f64::from(count) - 0.5).abs() < 1e-4, "{rest}");
-        }
-    }
-
-    #[test]
-    fn shares_of_1_leave_no_number_unused() {
-        let shares = Shares {
-            specular: [0.1, 0.2],
-            diffuse: [0.3, 0.4 - 1e-16],
-            refraction: 1.0,
-        };
-        assert!(shares.pick(1.0 - f64::EPSILON / 2.0).is_some());
-    }
 }

@@ -9,7 +9,8 @@ use etendue_math::trig::sin_cos_turns;
 use etendue_sampling::more_numbers::MoreNumbers;
 
 use super::albedo::Albedo;
-use super::contract::{Bsdf, Facts, Media, Parameters, Parts, Product, Shares, by_cosine};
+use super::contract::{Bsdf, Facts, Media, Parameters, Parts, Product, by_cosine};
+use super::shares::Shares;
 
 /// f = peak · cosⁿ α, α being the angle from an axis, and 0 beyond 90°; from both sides alike.
 #[derive(Clone, Debug)]
@@ -189,7 +190,7 @@ impl Product for CosinePower {
 }
 
 #[cfg(test)]
-impl super::contract::Examples for CosinePower {
+impl super::examples::Examples for CosinePower {
     fn examples() -> Vec<Self> {
         [
             (0.5, 3.0, false, false),

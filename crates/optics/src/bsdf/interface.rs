@@ -2,7 +2,8 @@
 
 use etendue_math::Vec3;
 
-use super::contract::{Bsdf, Facts, Media, Shares};
+use super::contract::{Bsdf, Facts, Media};
+use super::shares::Shares;
 use crate::fresnel::fresnel;
 
 /// A smooth interface of the media on both sides.
@@ -40,7 +41,7 @@ impl Bsdf for Interface {
 }
 
 #[cfg(test)]
-impl super::contract::Examples for Interface {
+impl super::examples::Examples for Interface {
     const MEDIA: bool = true;
 
     fn examples() -> Vec<Self> {

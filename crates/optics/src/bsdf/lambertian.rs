@@ -4,7 +4,8 @@ use std::f64::consts::FRAC_1_PI;
 
 use etendue_math::Vec3;
 
-use super::contract::{Bsdf, Facts, Media, Outward, Parts, Product, Shares};
+use super::contract::{Bsdf, Facts, Media, Outward, Parts, Product};
+use super::shares::Shares;
 use crate::table::Table;
 
 /// Cosines of the angle of incidence at which is asked how much light may come from a side.
@@ -92,7 +93,7 @@ impl Product for Lambertian {
 }
 
 #[cfg(test)]
-impl super::contract::Examples for Lambertian {
+impl super::examples::Examples for Lambertian {
     fn examples() -> Vec<Self> {
         let table = |a: f64, b: f64| Table::new(vec![0.0, 1.5], vec![500.0], vec![a, b]).expect("sound");
         [

@@ -2,7 +2,8 @@
 
 use etendue_math::Vec3;
 
-use super::contract::{Bsdf, Facts, Media, Shares};
+use super::contract::{Bsdf, Facts, Media};
+use super::shares::Shares;
 use crate::fresnel::fresnel;
 use crate::table::Table;
 
@@ -65,7 +66,7 @@ impl Bsdf for Mirror {
 }
 
 #[cfg(test)]
-impl super::contract::Examples for Mirror {
+impl super::examples::Examples for Mirror {
     const MEDIA: bool = true;
 
     fn examples() -> Vec<Self> {

@@ -5,9 +5,10 @@ use std::sync::{Arc, OnceLock};
 use etendue_math::Vec3;
 use etendue_sampling::warp::part_of;
 
-use super::contract::{Bsdf, Facts, Media, Outward, Parameters, Parts, Product, Shares};
+use super::contract::{Bsdf, Facts, Media, Outward, Parameters, Parts, Product};
 use super::lambertian::Lambertian;
 use super::mirror::Mirror;
+use super::shares::Shares;
 use crate::table::Table;
 
 /// A sum of BSDFs, each times a weight.
@@ -381,7 +382,7 @@ fn pick(
 }
 
 #[cfg(test)]
-impl super::contract::Examples for Mixture {
+impl super::examples::Examples for Mixture {
     const MEDIA: bool = true;
 
     fn examples() -> Vec<Self> {

@@ -10,16 +10,22 @@ mod albedo;
 mod coated;
 mod contract;
 mod cosine_power;
+mod drawn;
+#[cfg(test)]
+mod examples;
 mod facets;
+mod gauss;
 mod interface;
 mod lambertian;
 mod lobe;
 mod mirror;
 mod mixture;
 mod monotone_cubic;
+mod profile;
 mod rough_coat;
 mod rough_interface;
 mod rough_metal;
+mod shares;
 mod table_arrivals;
 mod table_base;
 mod table_draw;
@@ -29,6 +35,7 @@ mod table_lanes;
 mod table_lobes;
 mod table_nodes;
 mod table_sides;
+mod table_slice;
 mod table_steps;
 mod table_waiting;
 mod tabulated;
@@ -36,19 +43,22 @@ mod tabulated;
 mod tests;
 
 pub use coated::Coated;
-pub use contract::{Bsdf, Component, Drawn, Facts, Media, Outcome, Outward, Parameters, Parts, Product, Shares};
+pub use contract::{Bsdf, Facts, Media, Outward, Parameters, Parts, Product};
 pub use cosine_power::CosinePower;
+pub use drawn::{Drawn, Outcome};
 pub use interface::Interface;
 pub use lambertian::Lambertian;
-pub use lobe::{Lobe, Profile};
+pub use lobe::Lobe;
 pub use mirror::Mirror;
 pub use mixture::Mixture;
+pub use profile::Profile;
 pub use rough_coat::RoughCoat;
 pub use rough_interface::RoughInterface;
 pub use rough_metal::RoughMetal;
-pub use table_grid::Slice;
+pub use shares::{Component, Shares};
 pub use table_lobes::{Row, Way};
 pub use table_sides::Side;
+pub use table_slice::Slice;
 pub use tabulated::Tabulated;
 
 /// A BSDF from the name of its kind and its parameters; None if there is no such kind.
@@ -71,9 +81,9 @@ pub fn described(kind: &str, by: &dyn Parameters) -> Option<Result<Arc<dyn Bsdf>
 
 /// Examples of all kinds, by the names of their files: what the tests go through.
 #[cfg(test)]
-fn kinds() -> &'static [Vec<contract::Example>] {
-    use contract::Examples;
-    static KINDS: std::sync::OnceLock<Vec<Vec<contract::Example>>> = std::sync::OnceLock::new();
+fn kinds() -> &'static [Vec<examples::Example>] {
+    use examples::Examples;
+    static KINDS: std::sync::OnceLock<Vec<Vec<examples::Example>>> = std::sync::OnceLock::new();
     KINDS.get_or_init(|| {
         vec![
             Coated::named("coated"),

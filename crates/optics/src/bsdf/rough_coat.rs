@@ -8,8 +8,9 @@ use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
 use super::albedo::ByHeight;
-use super::contract::{Bsdf, Facts, Media, Outward, Parameters, Parts, Product, Shares, by_cosine, proposed};
+use super::contract::{Bsdf, Facts, Media, Outward, Parameters, Parts, Product, by_cosine, proposed};
 use super::rough_interface::{RoughFacets, above, from_side};
+use super::shares::Shares;
 use crate::table::Table;
 
 /// A rough coat of a refractive index on a Lambertian base, from both sides alike.
@@ -216,7 +217,7 @@ impl Product for RoughCoat {
 }
 
 #[cfg(test)]
-impl super::contract::Examples for RoughCoat {
+impl super::examples::Examples for RoughCoat {
     const MEDIA: bool = true;
 
     fn examples() -> Vec<Self> {

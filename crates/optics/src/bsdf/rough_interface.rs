@@ -15,8 +15,9 @@ use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
 use super::albedo::{Albedo, ByHeight, LOWEST};
-use super::contract::{Bsdf, Facts, Media, Parameters, Shares, by_cosine};
+use super::contract::{Bsdf, Facts, Media, Parameters, by_cosine};
 use super::facets::Facets;
+use super::shares::Shares;
 use crate::fresnel::fresnel;
 
 /// Steps of the logarithm of the ratio of indices for which shares are tabled, linear in between, and the largest logarithm.
@@ -383,7 +384,7 @@ impl Bsdf for RoughInterface {
 }
 
 #[cfg(test)]
-impl super::contract::Examples for RoughInterface {
+impl super::examples::Examples for RoughInterface {
     const MEDIA: bool = true;
 
     fn examples() -> Vec<Self> {

@@ -12,9 +12,10 @@ use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
 use super::albedo::Albedo;
-use super::contract::{Bsdf, Facts, Media, Parameters, Shares, by_cosine};
+use super::contract::{Bsdf, Facts, Media, Parameters, by_cosine};
 use super::facets::Facets;
 use super::rough_interface::{above, from_side, mirrored, over_facets};
+use super::shares::Shares;
 use crate::table::Table;
 
 /// A rough metal, from both sides alike.
@@ -199,7 +200,7 @@ impl Bsdf for RoughMetal {
 }
 
 #[cfg(test)]
-impl super::contract::Examples for RoughMetal {
+impl super::examples::Examples for RoughMetal {
     fn examples() -> Vec<Self> {
         let rising = Table::new(
             vec![0.0, 1.2, FRAC_PI_2],

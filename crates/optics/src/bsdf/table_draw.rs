@@ -7,7 +7,7 @@
 use etendue_math::trig::sin_cos_turns;
 use multiversion::multiversion;
 
-use super::contract::Outcome;
+use super::drawn::Outcome;
 use super::table_arrivals::{ABSORBED, Arrivals, Lanes, OFF_SLICE, TOGETHER};
 use super::table_base::Base;
 use super::table_lanes::{LANES, blocks};

@@ -1,29 +1,12 @@
-//! A slice of a table of scattered light: f on a polar grid, its integrals, and points drawn from it.
+//! A slice of a table of scattered light, ready to be asked: its integrals, and points drawn from it.
 
-use std::f64::consts::{FRAC_1_PI, TAU};
+use std::f64::consts::TAU;
 
-use etendue_math::special::{exp, ln};
 use etendue_math::trig::sin_cos_turns;
 use etendue_sampling::alias::{Alias, Slot};
 
 use super::table_hats::Hat;
-
-/// f on a polar grid in the plane of direction cosines.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Slice {
-    /// |β₀|: the sine of the angle of incidence.
-    pub sine: f64,
-    /// |β − β₀|, rising from 0.
-    pub radial: Vec<f64>,
-    /// How many azimuths, evenly spaced from 0.
-    pub azimuths: usize,
-    /// f \[1/sr\], azimuth by azimuth; constant beyond the last radial coordinate.
-    pub f: Vec<f64>,
-    /// Share of the flux at this incidence, without the base.
-    pub share: f64,
-    /// Share of the flux in the base.
-    pub base: f64,
-}
+use super::table_slice::Slice;
 
 /// A slice that can be asked and drawn from.
 #[derive(Clone, Debug)]
@@ -81,148 +64,6 @@ fn leading(x: f64) -> u64 {
     x.to_bits() >> SHIFT
 }
 
-/// Slices in between are made for steps of incidence of this size \[rad\] at most.
-const STEP: f64 = 0.0875;
-
-/// What is added to f before its logarithm is taken, relative to the largest f.
-const LITTLE: f64 = 1e-6;
-
-/// f that is nothing beside the largest one.
-const NOTHING: f64 = 1e-9;
-
-impl Slice {
-    /// Slices between this incidence and another one, close to each other: the logarithm of f is linear in the angle of incidence, so
-    /// that a lobe that grows and narrows stays one lobe. Where one of both has nothing, f is linear itself: a hole is no lobe. And what
-    /// is little beside the base is nearly linear: it is the logarithm of all of the light, with a base of this share by the sine.
-    ///
-    /// None where the grids differ in azimuths.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "at most 18 steps"
-    )]
-    pub(super) fn up_to(&self, other: &Self, base: impl Fn(f64) -> f64) -> Vec<Self> {
-        let [from, to] = [self.sine, other.sine].map(|sine| sine.min(1.0).asin());
-        let steps = ((to - from) / STEP).ceil() as usize;
-        if self.azimuths != other.azimuths || self.radial.is_empty() || other.radial.is_empty() {
-            return Vec::new();
-        }
-        // A lobe that does not change needs nothing in between.
-        if self.radial == other.radial && self.f == other.f {
-            return Vec::new();
-        }
-        let radial = finer(&self.radial, &other.radial);
-        let [a, b] = [self, other].map(|slice| slice.on(&radial));
-        let largest = a.iter().chain(&b).copied().fold(0.0, f64::max);
-        let [little, nothing] = [LITTLE, NOTHING].map(|part| (part * largest).max(f64::MIN_POSITIVE));
-        let below = |base: f64| little + base * FRAC_1_PI;
-        let [under, under_other] = [self, other].map(|slice| below(slice.base));
-        (1..steps)
-            .map(|k| {
-                let part = k as f64 / steps as f64;
-                let sine = (from + part * (to - from)).sin();
-                let there = below(base(sine));
-                let mean = |(a, b): (&f64, &f64)| {
-                    let all = exp((1.0 - part) * ln(a + under) + part * ln(b + under_other));
-                    let geometric = (all - there).max(0.0);
-                    let linear = (1.0 - part) * a + part * b;
-                    let least = a.min(*b);
-                    linear + (geometric - linear) * least / (least + nothing)
-                };
-                Self {
-                    sine,
-                    radial: radial.clone(),
-                    azimuths: self.azimuths,
-                    f: a.iter().zip(&b).map(mean).collect(),
-                    share: 0.0,
-                    base: 0.0,
-                }
-            })
-            .collect()
-    }
-
-    /// f on other radial coordinates.
-    fn on(&self, radial: &[f64]) -> Vec<f64> {
-        let n = self.radial.len();
-        let along = |row: &[f64]| -> Vec<f64> {
-            let at = |r: &f64| {
-                let i = self.radial.partition_point(|x| x <= r).max(1) - 1;
-                let next = (i + 1).min(n - 1);
-                if next == i {
-                    return row[i];
-                }
-                row[i] + (row[next] - row[i]) * (r - self.radial[i]) / (self.radial[next] - self.radial[i])
-            };
-            radial.iter().map(at).collect()
-        };
-        self.f.chunks(n).flat_map(along).collect()
-    }
-
-    /// Ready to be asked; to be drawn from where sines of incidence lie between these, so that nodes beyond the unit circle are
-    /// left out. None: in all of the plane.
-    ///
-    /// # Errors
-    /// What is wrong with the slice.
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "fewer than 2^16 radial coordinates; single precision is meant"
-    )]
-    pub(super) fn grid(&self, sines: Option<[f64; 2]>) -> Result<Grid, String> {
-        let Self {
-            radial, azimuths, f, ..
-        } = self;
-        let rises = radial.windows(2).all(|pair| pair[0] < pair[1]);
-        if radial.first() != Some(&0.0) || !rises || radial[radial.len() - 1] > END {
-            return Err("radial coordinates do not rise from 0 to 2 at most".into());
-        }
-        if radial.len() > usize::from(u16::MAX) {
-            return Err("a slice has more than 65535 radial coordinates".into());
-        }
-        if *azimuths == 0 || f.len() != azimuths * radial.len() || i32::try_from(f.len()).is_err() {
-            return Err("values of a slice do not fit its grid".into());
-        }
-        if !f.iter().all(|value| (0.0..=f64::from(f32::MAX)).contains(value)) {
-            return Err("a value of f is not from 0 to 3.4e38".into());
-        }
-        if !(0.0..=1.0).contains(&self.sine) {
-            return Err("a sine of incidence is not from 0 to 1".into());
-        }
-        if !(self.share >= 0.0 && self.base >= 0.0 && self.share + self.base <= 1.0 + 1e-9) {
-            return Err(format!("{} of the flux leaves", self.share + self.base));
-        }
-        let mut all = radial.clone();
-        if radial[radial.len() - 1] < END {
-            all.push(END);
-        }
-        // Constant beyond the last of its coordinates.
-        let on_all = |row: &[f64]| (0..all.len()).map(|i| row[i.min(row.len() - 1)]).collect::<Vec<f64>>();
-        let f: Vec<f64> = f.chunks(radial.len()).flat_map(on_all).collect();
-        let wholes: Vec<f64> = (0..all.len()).map(|i| Hat::of(&all, i).whole()).collect();
-        let (nodes, halves, rows) =
-            nodes_of(&all, *azimuths, &f, &wholes, sines).ok_or("a slice has too many values")?;
-        let lowest = all.get(1).map_or(0, |r| leading(*r));
-        let first_above = |bits: u64| all.partition_point(|r| *r < f64::from_bits(bits << SHIFT));
-        Ok(Grid {
-            sine: self.sine,
-            azimuths: *azimuths,
-            f: f[..rows * all.len()].iter().map(|f| *f as f32).collect(),
-            rows,
-            size: Size {
-                radii: all.len() as f64,
-                azimuths: *azimuths as f64,
-                places: nodes.slots().len() as f64,
-                halves,
-            },
-            nodes,
-            first_below: (lowest..=leading(END))
-                .map(|bits| first_above(bits).max(1) as u16 - 1)
-                .collect(),
-            lowest,
-            radial: all,
-        })
-    }
-}
-
 /// The table of the nodes of a slice by what they contribute, the halves that it stands for, and how many azimuths are in it;
 /// None: there are too many.
 fn nodes_of(
@@ -248,26 +89,6 @@ fn nodes_of(
     let weights: Vec<f64> = (0..drawn * n).map(weight).collect();
     let nodes = Alias::new(&weights).or_else(|| Alias::new(&[1.0]))?;
     Some((nodes, if alike { 2.0 } else { 1.0 }, drawn))
-}
-
-/// Of two lists of radial coordinates that rise from 0 the finer one at each place, and the ends of both. All of both would be
-/// twice as many, and nothing in either needs them.
-fn finer(one: &[f64], other: &[f64]) -> Vec<f64> {
-    /// By how much finer the other list has to be where both are alike.
-    const CLEARLY: f64 = 1.05;
-    // From the last coordinate that is not above a place to the next.
-    let step = |radial: &[f64], r: f64| {
-        let above = radial.partition_point(|x| *x <= r).max(1);
-        radial.get(above).map_or(f64::INFINITY, |next| next - radial[above - 1])
-    };
-    let is_finer = |r: f64| CLEARLY * step(other, r) < step(one, r);
-    let ends = [one, other].map(|radial| radial[radial.len() - 1]);
-    let of_one = one.iter().filter(|r| ends.contains(r) || !is_finer(**r));
-    let of_other = other.iter().filter(|r| ends.contains(r) || is_finer(**r));
-    let mut radial: Vec<f64> = of_one.chain(of_other).copied().collect();
-    radial.sort_by(f64::total_cmp);
-    radial.dedup();
-    radial
 }
 
 /// Whether the hats of a node, an azimuth and a radial coordinate, reach into the unit circle about −β₀ for any |β₀| of a range.
@@ -306,6 +127,70 @@ pub(super) fn half(number: f64, halves: f64) -> (f64, bool) {
 }
 
 impl Grid {
+    /// A slice ready to be asked; to be drawn from where sines of incidence lie between these, so that nodes beyond the unit
+    /// circle are left out. None: in all of the plane.
+    ///
+    /// # Errors
+    /// What is wrong with the slice.
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "fewer than 2^16 radial coordinates; single precision is meant"
+    )]
+    pub(super) fn of(slice: &Slice, sines: Option<[f64; 2]>) -> Result<Self, String> {
+        let Slice {
+            radial, azimuths, f, ..
+        } = slice;
+        let rises = radial.windows(2).all(|pair| pair[0] < pair[1]);
+        if radial.first() != Some(&0.0) || !rises || radial[radial.len() - 1] > END {
+            return Err("radial coordinates do not rise from 0 to 2 at most".into());
+        }
+        if radial.len() > usize::from(u16::MAX) {
+            return Err("a slice has more than 65535 radial coordinates".into());
+        }
+        if *azimuths == 0 || f.len() != azimuths * radial.len() || i32::try_from(f.len()).is_err() {
+            return Err("values of a slice do not fit its grid".into());
+        }
+        if !f.iter().all(|value| (0.0..=f64::from(f32::MAX)).contains(value)) {
+            return Err("a value of f is not from 0 to 3.4e38".into());
+        }
+        if !(0.0..=1.0).contains(&slice.sine) {
+            return Err("a sine of incidence is not from 0 to 1".into());
+        }
+        if !(slice.share >= 0.0 && slice.base >= 0.0 && slice.share + slice.base <= 1.0 + 1e-9) {
+            return Err(format!("{} of the flux leaves", slice.share + slice.base));
+        }
+        let mut all = radial.clone();
+        if radial[radial.len() - 1] < END {
+            all.push(END);
+        }
+        // Constant beyond the last of its coordinates.
+        let on_all = |row: &[f64]| (0..all.len()).map(|i| row[i.min(row.len() - 1)]).collect::<Vec<f64>>();
+        let f: Vec<f64> = f.chunks(radial.len()).flat_map(on_all).collect();
+        let wholes: Vec<f64> = (0..all.len()).map(|i| Hat::of(&all, i).whole()).collect();
+        let (nodes, halves, rows) =
+            nodes_of(&all, *azimuths, &f, &wholes, sines).ok_or("a slice has too many values")?;
+        let lowest = all.get(1).map_or(0, |r| leading(*r));
+        let first_above = |bits: u64| all.partition_point(|r| *r < f64::from_bits(bits << SHIFT));
+        Ok(Self {
+            sine: slice.sine,
+            azimuths: *azimuths,
+            f: f[..rows * all.len()].iter().map(|f| *f as f32).collect(),
+            rows,
+            size: Size {
+                radii: all.len() as f64,
+                azimuths: *azimuths as f64,
+                places: nodes.slots().len() as f64,
+                halves,
+            },
+            nodes,
+            first_below: (lowest..=leading(END))
+                .map(|bits| first_above(bits).max(1) as u16 - 1)
+                .collect(),
+            lowest,
+            radial: all,
+        })
+    }
+
     /// The azimuth after one.
     #[inline]
     const fn after(&self, j: usize) -> usize {
@@ -520,40 +405,6 @@ mod tests {
     use crate::chi_squared::{CRITICAL, deviate};
 
     #[test]
-    fn of_two_grids_the_finer_one_is_taken_at_each_place() {
-        let even = |n: u32, from: f64| {
-            (0..n)
-                .map(|k| f64::from(k) * 0.1 + if k > 0 { from } else { 0.0 })
-                .collect::<Vec<_>>()
-        };
-        // Alike, but for where they stand: one of them, and the end of the other one.
-        let (one, other) = (even(21, 0.0), even(20, 0.04));
-        let found = finer(&one, &other);
-        assert!(one.iter().all(|r| found.contains(r)));
-        assert!(found.len() <= one.len() + 2, "{found:?}");
-        // Fine in the middle here, beyond it there: of both what is fine, and no step wider than the finer of both has there.
-        let one: Vec<f64> = (0..20).map(|k| 0.02 * f64::from(k)).chain([0.8, 1.2]).collect();
-        let other: Vec<f64> = (0..4)
-            .map(|k| 0.2 * f64::from(k))
-            .chain((0..20).map(|k| 0.8 + 0.03 * f64::from(k)))
-            .collect();
-        let found = finer(&one, &other);
-        assert!(found.is_sorted() && found[0] == 0.0 && found[found.len() - 1] == other[other.len() - 1]);
-        assert!(one[..19].iter().chain(&other[4..]).all(|r| found.contains(r)));
-        assert!(found.len() < one.len() + other.len() - 3, "{found:?}");
-        for pair in found.windows(2) {
-            let limit = if pair[1] < 0.39 {
-                0.021
-            } else if pair[0] > 0.79 {
-                0.031
-            } else {
-                0.201
-            };
-            assert!(pair[1] - pair[0] <= limit, "{pair:?}");
-        }
-    }
-
-    #[test]
     fn nodes_that_are_left_out_reach_nowhere_into_the_circle() {
         let radial = [0.0, 0.05, 0.3, 0.7, 1.1, 1.5, 2.0];
         let mut seen = [0; 2];
@@ -595,7 +446,7 @@ mod tests {
             share: 0.5,
             base: 0.0,
         };
-        let grid = slice.grid(None).expect("sound");
+        let grid = Grid::of(&slice, None).expect("sound");
         let (radii, turns) = (40, 24);
         let cell = |r: f64, turn: f64| (r / END * f64::from(radii), turn * f64::from(turns));
         let mut counts = vec![0_u64; 40 * 24];

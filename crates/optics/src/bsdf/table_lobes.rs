@@ -10,7 +10,8 @@ use etendue_sampling::warp::part_of;
 use rayon::prelude::*;
 
 use super::monotone_cubic::Cubic;
-use super::table_grid::{Grid, Slice};
+use super::table_grid::Grid;
+use super::table_slice::Slice;
 use super::table_steps::{Step, Steps};
 
 /// Shares that should add up to 1 may fall short of it by as much as they are rounded; what reaches this is all of the light.
@@ -84,7 +85,7 @@ impl Row {
             // From the slice before to the one after.
             let from = k.checked_sub(1).map_or(0.0, |before| between[before].sine);
             let to = between.get(k + 1).map_or(1.0, |after| after.sine);
-            between[k].grid(Some([from, to]))
+            Grid::of(&between[k], Some([from, to]))
         };
         let slices: Vec<Grid> = (0..between.len()).map(grid).collect::<Result<_, String>>()?;
         let steps = Steps::of(&slices, &share, &base);

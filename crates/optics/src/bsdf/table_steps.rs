@@ -308,7 +308,7 @@ impl Blend {
 mod tests {
     use etendue_math::special::exp;
 
-    use super::super::table_grid::Slice;
+    use super::super::table_slice::Slice;
     use super::*;
 
     #[test]
@@ -324,7 +324,10 @@ mod tests {
             base,
         };
         let slices = [slice(0.0, 0.3, 0.1), slice(0.5, 0.2, 0.2), slice(0.95, 0.4, 0.15)];
-        let grids: Vec<Grid> = slices.iter().map(|slice| slice.grid(None).expect("sound")).collect();
+        let grids: Vec<Grid> = slices
+            .iter()
+            .map(|slice| Grid::of(slice, None).expect("sound"))
+            .collect();
         let of = |pick: fn(&Slice) -> f64| {
             let squares: Vec<f64> = slices.iter().map(|slice| slice.sine * slice.sine).collect();
             Cubic::new(&squares, &slices.iter().map(pick).collect::<Vec<_>>())

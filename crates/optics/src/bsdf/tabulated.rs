@@ -19,7 +19,9 @@ use std::sync::Arc;
 use etendue_geometry::surface_points::Vectors;
 use etendue_math::Vec3;
 
-use super::contract::{Bsdf, Drawn, Facts, Media, Outcome, Parts, Product, Shares};
+use super::contract::{Bsdf, Facts, Media, Parts, Product};
+use super::drawn::{Drawn, Outcome};
+use super::shares::Shares;
 use super::table_base::Base;
 use super::table_draw::Group;
 use super::table_grid::Grid;
@@ -252,15 +254,15 @@ impl Product for Tabulated {
 }
 
 #[cfg(test)]
-impl super::contract::Examples for Tabulated {
+impl super::examples::Examples for Tabulated {
     // f has kinks at the nodes of each slice. A quadrature of 16 times the steps leaves 4e-6.
     const QUADRATURE: f64 = 2e-4;
 
     fn examples() -> Vec<Self> {
         use std::f64::consts::TAU;
 
-        use super::table_grid::Slice;
         use super::table_lobes::{Row, Way};
+        use super::table_slice::Slice;
 
         let slice = |azimuths: usize, width: f64, [skew, aside]: [f64; 2], sine: f64, [share, base]: [f64; 2]| {
             let radial: Vec<f64> = (0..24).map(|i| 2.0 * (f64::from(i) / 23.0).powi(2)).collect();

@@ -7,6 +7,7 @@ use etendue_geometry::face::SurfacePoint;
 use etendue_geometry::hits::Hits;
 use etendue_geometry::surface_points::Vectors;
 use etendue_math::Vec3;
+use etendue_math::heads::{heads, heads_mut};
 use etendue_optics::fresnel::{fresnel, reflect, refract};
 use multiversion::multiversion;
 
@@ -145,9 +146,9 @@ impl InterfaceRays {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn turn(rays: &mut InterfaceRays) {
     let n = rays.who.len();
-    let [dx, dy, dz] = rays.directions.each_mut().map(|v| &mut v[..n]);
-    let [nx, ny, nz] = rays.normals.each_ref().map(|v| &v[..n]);
-    let [n1, n2] = rays.n.each_ref().map(|v| &v[..n]);
+    let [dx, dy, dz] = heads_mut(&mut rays.directions, n);
+    let [nx, ny, nz] = heads(&rays.normals, n);
+    let [n1, n2] = heads(&rays.n, n);
     let (numbers, mirrors) = (&rays.numbers[..n], &mut rays.mirrored[..n]);
     for k in 0..n {
         let d = Vec3::new(dx[k], dy[k], dz[k]);

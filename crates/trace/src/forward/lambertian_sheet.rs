@@ -6,6 +6,7 @@ use etendue_geometry::Face;
 use etendue_geometry::hits::Hits;
 use etendue_geometry::surface_points::{Vectors, fill, gather, surface_points};
 use etendue_math::Vec3;
+use etendue_math::heads::{heads, heads_mut};
 use etendue_optics::bsdf::Facts;
 use etendue_optics::fresnel::reflect;
 use etendue_optics::source::surface::about;
@@ -150,9 +151,9 @@ impl SheetRays {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn turn(sheet: LambertianSheet, numbers: &[Vec<f64>; 2], normals: &Vectors, directions: &mut Vectors) {
     let n = directions[0].len();
-    let [dx, dy, dz] = directions.each_mut().map(|v| &mut v[..n]);
-    let [nx, ny, nz] = normals.each_ref().map(|v| &v[..n]);
-    let [lobe, turn] = numbers.each_ref().map(|v| &v[..n]);
+    let [dx, dy, dz] = heads_mut(directions, n);
+    let [nx, ny, nz] = heads(normals, n);
+    let [lobe, turn] = heads(numbers, n);
     for k in 0..n {
         let (d, normal) = (Vec3::new(dx[k], dy[k], dz[k]), Vec3::new(nx[k], ny[k], nz[k]));
         let height_in = d.dot(normal);

@@ -5,6 +5,7 @@
 
 use etendue_geometry::surface_points::Vectors;
 use etendue_math::Vec3;
+use etendue_math::heads::{heads, heads_mut};
 use etendue_optics::bsdf::{Bsdf, Media, Outcome};
 use etendue_optics::fresnel::reflect;
 use multiversion::multiversion;
@@ -152,7 +153,7 @@ fn each(normals: &Vectors, vectors: &mut Vectors, mut change: impl FnMut(usize, 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn outward(normals: &Vectors, directions: &Vectors, towards: &mut Vectors) {
     let n = towards[0].len();
-    let [dx, dy, dz] = directions.each_ref().map(|list| &list[..n]);
+    let [dx, dy, dz] = heads(directions, n);
     each(normals, towards, |k, normal, _| {
         local(&axes(normal), -Vec3::new(dx[k], dy[k], dz[k]))
     });
@@ -162,8 +163,8 @@ fn outward(normals: &Vectors, directions: &Vectors, towards: &mut Vectors) {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn outward_along(axis: Vec3, normals: &Vectors, directions: &Vectors, towards: &mut Vectors, firsts: &mut Vectors) {
     let n = towards[0].len();
-    let [dx, dy, dz] = directions.each_ref().map(|list| &list[..n]);
-    let [fx, fy, fz] = firsts.each_mut().map(|list| &mut list[..n]);
+    let [dx, dy, dz] = heads(directions, n);
+    let [fx, fy, fz] = heads_mut(firsts, n);
     each(normals, towards, |k, normal, _| {
         let axes = axes_along(normal, axis);
         (fx[k], fy[k], fz[k]) = (axes[0].x, axes[0].y, axes[0].z);
@@ -181,7 +182,7 @@ fn in_space(normals: &Vectors, vectors: &mut Vectors) {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn in_space_along(normals: &Vectors, firsts: &Vectors, vectors: &mut Vectors) {
     let n = vectors[0].len();
-    let [fx, fy, fz] = firsts.each_ref().map(|list| &list[..n]);
+    let [fx, fy, fz] = heads(firsts, n);
     each(normals, vectors, |k, normal, v| {
         along(&axes_from(normal, Vec3::new(fx[k], fy[k], fz[k])), v)
     });

@@ -7,6 +7,7 @@ use etendue_geometry::origin_faces::NONE;
 use etendue_geometry::ray_block::RayBlock;
 use etendue_geometry::surface_points::{Vectors, choose, fill, gather, surface_points};
 use etendue_math::Vec3;
+use etendue_math::heads::{heads, heads_mut};
 use etendue_optics::fresnel::{fresnel, reflect, refract};
 use multiversion::multiversion;
 
@@ -278,11 +279,11 @@ fn refract_all(scratch: &mut SplitScratch) {
     for list in scratch.refracted.iter_mut().chain(&mut scratch.shares) {
         list.resize(n, 0.0);
     }
-    let [dx, dy, dz] = scratch.mirrored.each_mut().map(|v| &mut v[..n]);
-    let [rx, ry, rz] = scratch.refracted.each_mut().map(|v| &mut v[..n]);
-    let [back, through] = scratch.shares.each_mut().map(|v| &mut v[..n]);
-    let [nx, ny, nz] = scratch.normals.each_ref().map(|v| &v[..n]);
-    let [n1, n2] = scratch.n.each_ref().map(|v| &v[..n]);
+    let [dx, dy, dz] = heads_mut(&mut scratch.mirrored, n);
+    let [rx, ry, rz] = heads_mut(&mut scratch.refracted, n);
+    let [back, through] = heads_mut(&mut scratch.shares, n);
+    let [nx, ny, nz] = heads(&scratch.normals, n);
+    let [n1, n2] = heads(&scratch.n, n);
     let sign = &scratch.sign[..n];
     for k in 0..n {
         let d = Vec3::new(dx[k], dy[k], dz[k]);

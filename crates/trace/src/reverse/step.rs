@@ -2,7 +2,7 @@
 
 use etendue_geometry::hits::{Hits, TIE};
 use etendue_geometry::surface_points::fill;
-use etendue_lightfield::leave::Sights;
+use etendue_lightfield::carrier::Sights;
 
 use super::diffuse::Known;
 use super::method::LeftOut;

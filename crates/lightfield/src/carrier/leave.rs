@@ -2,93 +2,12 @@
 
 use etendue_geometry::RayBatch;
 use etendue_geometry::ray_batch::BLOCK;
+use etendue_math::heads::heads;
 use etendue_math::{Frame, Vec3};
 use multiversion::multiversion;
 
-use crate::surface::{CarrierPart, Focus, Shape};
-
-/// Distance along a line at which it leaves a part, and the cosine under which the part's area is seen from where the line
-/// begins; the distance is NaN if it does not leave it.
-type Left = (f64, f64);
-
-/// A part as lines leave it, in its own coordinates.
-trait Leave {
-    fn leave(&self, o: Vec3, d: Vec3) -> Left;
-}
-
-#[inline(always)]
-fn left(met: bool, t: f64, cosine: f64) -> Left {
-    (if met { t } else { f64::NAN }, cosine)
-}
-
-struct Rectangle {
-    width: f64,
-    height: f64,
-    focus: Focus,
-}
-
-impl Leave for Rectangle {
-    #[inline(always)]
-    fn leave(&self, o: Vec3, d: Vec3) -> Left {
-        let t = -o.z / d.z;
-        let there = t + self.focus.at(d.z) / d.z;
-        let (x, y) = (
-            (o.x + there * d.x) / self.width + 0.5,
-            (o.y + there * d.y) / self.height + 0.5,
-        );
-        let inside = (0.0..=1.0).contains(&x) & (0.0..=1.0).contains(&y);
-        left((d.z > 0.0) & inside, t, self.focus.seen(d.z, o.z))
-    }
-}
-
-struct Disk {
-    radius: f64,
-}
-
-impl Leave for Disk {
-    #[inline(always)]
-    fn leave(&self, o: Vec3, d: Vec3) -> Left {
-        let t = -o.z / d.z;
-        let (x, y) = ((o.x + t * d.x) / self.radius, (o.y + t * d.y) / self.radius);
-        left((d.z > 0.0) & (x * x + y * y <= 1.0), t, d.z)
-    }
-}
-
-struct Hemisphere {
-    radius: f64,
-}
-
-impl Leave for Hemisphere {
-    #[inline(always)]
-    fn leave(&self, o: Vec3, d: Vec3) -> Left {
-        let middle = -o.dot(d);
-        let near = o + d * middle;
-        let half_chord = self.radius * self.radius - near.dot(near);
-        let half = half_chord.max(0.0).sqrt();
-        let met = (half_chord > 0.0) & (near.z + d.z * half >= 0.0);
-        left(met, middle + half, half / self.radius)
-    }
-}
-
-struct Tube {
-    radius: f64,
-    height: f64,
-}
-
-impl Leave for Tube {
-    #[inline(always)]
-    fn leave(&self, o: Vec3, d: Vec3) -> Left {
-        let across = d.x * d.x + d.y * d.y;
-        let middle = -(o.x * d.x + o.y * d.y) / across;
-        let (x, y) = (o.x + middle * d.x, o.y + middle * d.y);
-        let half_chord = (self.radius * self.radius - (x * x + y * y)) / across;
-        let half = half_chord.max(0.0).sqrt();
-        let t = middle + half;
-        let z = (o.z + t * d.z) / self.height + 0.5;
-        let met = (across > 0.0) & (half_chord > 0.0) & (0.0..=1.0).contains(&z);
-        left(met, t, half * across / self.radius)
-    }
-}
+use super::chart::Chart;
+use super::part::{CarrierPart, Shape, of_chart};
 
 /// Start points and unit directions of lines in the world, one array per axis, and how far each of them goes.
 #[derive(Clone, Copy, Debug)]
@@ -137,25 +56,13 @@ impl CarrierPart {
     #[must_use]
     pub fn leaves(&self, position: Vec3, direction: Vec3) -> Option<(f64, f64)> {
         let (o, d) = self.localise(position, direction);
-        let (t, cosine) = match self.shape {
-            Shape::Rectangle { width, height, focus } => Rectangle { width, height, focus }.leave(o, d),
-            Shape::Disk { radius } => Disk { radius }.leave(o, d),
-            Shape::Hemisphere { radius } => Hemisphere { radius }.leave(o, d),
-            Shape::Tube { radius, height } => Tube { radius, height }.leave(o, d),
-        };
+        let (t, cosine) = of_chart!(self.shape, chart => chart.leave(o, d));
         (!t.is_nan()).then_some((t, cosine))
     }
 
     /// Where each line of a block leaves the part.
     pub fn depart(&self, batch: &RayBatch, out: &mut Departures) {
-        match self.shape {
-            Shape::Rectangle { width, height, focus } => {
-                depart(&Rectangle { width, height, focus }, self, batch, out);
-            }
-            Shape::Disk { radius } => depart(&Disk { radius }, self, batch, out),
-            Shape::Hemisphere { radius } => depart(&Hemisphere { radius }, self, batch, out),
-            Shape::Tube { radius, height } => depart(&Tube { radius, height }, self, batch, out),
-        }
+        of_chart!(self.shape, chart => depart(&chart, self, batch, out));
     }
 
     /// Marks the lines of sight that meet the part's emitting side at 0 < t ≤ `reach`, the part standing in `frame`; others
@@ -168,40 +75,33 @@ impl CarrierPart {
             y: frame.direction_to_world(own.y),
             z: frame.direction_to_world(own.z),
         };
-        match self.shape {
-            Shape::Rectangle { width, height, focus } => {
-                mark(&Rectangle { width, height, focus }, &placed, sights, marks);
-            }
-            Shape::Disk { radius } => mark(&Disk { radius }, &placed, sights, marks),
-            Shape::Hemisphere { radius } => mark(&Hemisphere { radius }, &placed, sights, marks),
-            Shape::Tube { radius, height } => mark(&Tube { radius, height }, &placed, sights, marks),
-        }
+        of_chart!(self.shape, chart => mark(&chart, &placed, sights, marks));
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn depart<L: Leave>(leave: &L, part: &CarrierPart, batch: &RayBatch, out: &mut Departures) {
+fn depart<C: Chart>(chart: &C, part: &CarrierPart, batch: &RayBatch, out: &mut Departures) {
     let n = batch.len;
-    let [px, py, pz] = batch.position.each_ref().map(|v| &v[..n]);
-    let [kx, ky, kz] = batch.direction.each_ref().map(|v| &v[..n]);
+    let [px, py, pz] = heads(&batch.position, n);
+    let [kx, ky, kz] = heads(&batch.direction, n);
     let (distance, cosine) = (&mut out.distance[..n], &mut out.cosine[..n]);
     for i in 0..n {
         let (o, d) = part.localise(Vec3::new(px[i], py[i], pz[i]), Vec3::new(kx[i], ky[i], kz[i]));
-        (distance[i], cosine[i]) = leave.leave(o, d);
+        (distance[i], cosine[i]) = chart.leave(o, d);
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn mark<L: Leave>(part: &L, frame: &Frame, sights: Sights<'_>, marks: &mut [bool]) {
+fn mark<C: Chart>(chart: &C, frame: &Frame, sights: Sights<'_>, marks: &mut [bool]) {
     let n = marks.len();
-    let [ox, oy, oz] = sights.origin.map(|v| &v[..n]);
-    let [dx, dy, dz] = sights.direction.map(|v| &v[..n]);
+    let [ox, oy, oz] = heads(&sights.origin, n);
+    let [dx, dy, dz] = heads(&sights.direction, n);
     let reach = &sights.reach[..n];
     for i in 0..n {
         let o = frame.point_to_local(Vec3::new(ox[i], oy[i], oz[i]));
         let d = frame.direction_to_local(Vec3::new(dx[i], dy[i], dz[i]));
         // Light goes the other way.
-        let (back, _) = part.leave(o, -d);
+        let (back, _) = chart.leave(o, -d);
         marks[i] |= (back < 0.0) & (-back <= reach[i]);
     }
 }
@@ -209,7 +109,7 @@ fn mark<L: Leave>(part: &L, frame: &Frame, sights: Sights<'_>, marks: &mut [bool
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::surface::tests::{lattice, zoo};
+    use crate::carrier::tests::{lattice, zoo};
 
     /// Lines of sight about a part.
     pub(crate) struct SomeSights {

@@ -9,83 +9,17 @@ use std::ops::{ControlFlow, Range};
 use etendue_geometry::ray_batch::BLOCK;
 use etendue_geometry::{PassAccount, RayBatch, RaySource};
 use etendue_sampling::ordered::{self, Idle};
-use etendue_sampling::philox::Stream;
 use multiversion::multiversion;
 
-use crate::surface::{CarrierPart, Coordinates, carry};
+use crate::carrier::{Coordinates, carry};
 
-/// The purpose under which rays are held out (see [`Stream::new`]).
-pub const PURPOSE_HOLD_OUT: u64 = 0x484F_4C44;
+mod cells;
+mod plan;
 
-/// Chances are counted in these parts of one.
-pub const CHANCES: u32 = 1 << 16;
-
-/// Halvings of the coordinates of one part.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PartGrids {
-    /// Of each of the four, in the grid over all of them.
-    pub depths: [u32; 4],
-    /// In the fine grids: over the place, over the direction.
-    pub fine: [u32; 2],
-}
-
-impl PartGrids {
-    /// Halvings of each of the three grids together.
-    fn bits(&self) -> [u32; 3] {
-        [self.depths.iter().sum(), 2 * self.fine[0], 2 * self.fine[1]]
-    }
-}
-
-/// What to count.
-#[derive(Clone, Debug)]
-pub struct Plan {
-    /// The charts, in the order in which rays are offered to them.
-    pub parts: Vec<CarrierPart>,
-    /// The grids of each.
-    pub grids: Vec<PartGrids>,
-    /// Rays held out, in parts of [`CHANCES`].
-    pub held_out: u32,
-    /// Rays kept with their coordinates, in parts of [`CHANCES`]; at most `held_out`: they are among those.
-    pub kept: u32,
-    /// Seed of the choice.
-    pub seed: u64,
-}
-
-/// Halvings of each coordinate by which a cell is found; those of a coarser grid are among them.
-const FINEST: u32 = 16;
-
-/// Where the cells of each part begin in each of the three grids, and how many cells there are.
-#[derive(Clone, Debug)]
-struct Starts {
-    /// In the first fold.
-    parts: Vec<[u32; 3]>,
-    /// Of one fold.
-    total: [u32; 3],
-}
-
-impl Plan {
-    /// None if there is no part, one has no grids, or a cell has no number of 32 bits.
-    fn starts(&self) -> Option<Starts> {
-        if self.grids.len() != self.parts.len() || self.parts.is_empty() {
-            return None;
-        }
-        let (mut parts, mut total) = (Vec::with_capacity(self.parts.len()), [0_u32; 3]);
-        for grids in &self.grids {
-            if grids.depths.iter().chain(&grids.fine).any(|d| *d > FINEST) {
-                return None;
-            }
-            parts.push(total);
-            for (sum, bits) in total.iter_mut().zip(grids.bits()) {
-                *sum = sum.checked_add(1_u32.checked_shl(bits)?)?;
-            }
-        }
-        // Both folds have them.
-        total
-            .iter()
-            .all(|n| n.checked_mul(2).is_some())
-            .then_some(Starts { parts, total })
-    }
-}
+pub use cells::PURPOSE_HOLD_OUT;
+use cells::{cells_of_all, cells_of_each, chances, finest_cells, fold};
+use plan::Starts;
+pub use plan::{CHANCES, PartGrids, Plan};
 
 /// Σ w and Σ w² over the rays of each cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -276,96 +210,6 @@ fn count_all(flux: &[f64], part: &[u32], counts: &mut [bool]) -> bool {
     all
 }
 
-/// The cells in the grids of all parts together, both folds of them: those within their own grids are there already.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn fold(plan: &Plan, starts: &Starts, (chances, part): (&[u16], &[u32]), cells: &mut [Vec<u32>; 3]) {
-    for (k, cells) in cells.iter_mut().enumerate() {
-        let total = starts.total[k];
-        for (cell, chance) in cells.iter_mut().zip(chances) {
-            *cell += if u32::from(*chance) < plan.held_out { total } else { 0 };
-        }
-        // Those of the first part begin with 0.
-        if starts.parts.len() > 1 {
-            for (cell, part) in cells.iter_mut().zip(part) {
-                *cell += starts.parts.get(*part as usize).map_or(0, |starts| starts[k]);
-            }
-        }
-    }
-}
-
-/// The cells of the rays of a block in grids that are the same for all parts.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn cells_of_all(grids: PartGrids, finest: &[Vec<u32>; 4], len: usize, out: &mut [Vec<u32>; 3]) {
-    let [s1, s2, a, b] = finest.each_ref().map(|list| &list[..len]);
-    let [grid, space, direction] = out.each_mut().map(|list| &mut list[..len]);
-    for i in 0..len {
-        [grid[i], space[i], direction[i]] = cells_in(grids, [s1[i], s2[i], a[i], b[i]]);
-    }
-}
-
-/// The same where parts have grids of their own; any cell for rays that meet none.
-fn cells_of_each(grids: &[PartGrids], part: &[u32], finest: &[Vec<u32>; 4], out: &mut [Vec<u32>; 3]) {
-    for (i, part) in part.iter().enumerate() {
-        let own = grids.get(*part as usize).copied().unwrap_or(grids[0]);
-        let found = cells_in(own, finest.each_ref().map(|list| list[i]));
-        for (list, cell) in out.iter_mut().zip(found) {
-            list[i] = cell;
-        }
-    }
-}
-
-/// The cells of a block's coordinates, each in the finest grid.
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn finest_cells(at: &[Vec<f64>; 4], len: usize, out: &mut [Vec<u32>; 4]) {
-    for (values, numbers) in at.iter().zip(out) {
-        for (value, number) in values[..len].iter().zip(numbers) {
-            *number = cell(*value);
-        }
-    }
-}
-
-/// The cells of a ray in the three grids of its part.
-#[inline(always)]
-fn cells_in(grids: PartGrids, finest: [u32; 4]) -> [u32; 3] {
-    let joined = |axes: std::ops::Range<usize>, depths: [u32; 4]| {
-        axes.fold(0_u32, |c, k| c << depths[k] | finest[k] >> (FINEST - depths[k]))
-    };
-    let [place, direction] = grids.fine;
-    [
-        joined(0..4, grids.depths),
-        joined(0..2, [place; 4]),
-        joined(2..4, [direction; 4]),
-    ]
-}
-
-/// The cell of a coordinate from 0 to 1, both included; the first or the last one if it lies beyond, any if it is no number.
-#[inline(always)]
-#[allow(clippy::cast_possible_truncation, reason = "the low bits")]
-fn cell(value: f64) -> u32 {
-    const LAST: f64 = 1.0 - 0.5 / CELLS;
-    const CELLS: f64 = (1 << FINEST) as f64;
-    // Of a number from 1 to 2 the highest bits behind the point are the cell: what a conversion does more takes longer.
-    let inside = if value < LAST { value } else { LAST };
-    let inside = if inside > 0.0 { inside } else { 0.0 };
-    ((inside + 1.0).to_bits() >> (52 - FINEST)) as u32 & ((1 << FINEST) - 1)
-}
-
-/// A number from 0 to 65 535 for each ray of a block: sixteen from one call of the generator.
-#[allow(clippy::cast_possible_truncation, reason = "a word is cut into four pieces")]
-fn chances(seed: u64, first: u64, len: usize) -> Vec<u16> {
-    let stream = Stream::new(seed, PURPOSE_HOLD_OUT);
-    let last = first + len as u64;
-    let mut numbers = Vec::with_capacity(len + 30);
-    for block in first / 16..last.div_ceil(16) {
-        for word in stream.words(block) {
-            numbers.extend([0, 16, 32, 48].map(|shift| (word >> shift) as u16));
-        }
-    }
-    numbers.drain(..(first % 16) as usize);
-    numbers.truncate(len);
-    numbers
-}
-
 /// Counts all rays of a source on a surface.
 ///
 /// Every sum runs in ray order, so its bits do not depend on the number of threads. Memory: the grids, twice 12 bytes per
@@ -433,7 +277,7 @@ pub fn count(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::tests::{lattice, zoo};
+    use crate::carrier::tests::{lattice, zoo};
     use etendue_geometry::table::{Float, Layout, RayTable};
 
     fn bytes(n: u32, weights: impl Fn(u32) -> f64) -> Vec<u8> {
@@ -476,20 +320,6 @@ mod tests {
     fn run(bytes: &[u8], threads: usize) -> Counts {
         let table = RayTable::new(bytes, LAYOUT).expect("valid");
         count(&table, &plan(), threads, |_| ControlFlow::Continue(())).expect("countable")
-    }
-
-    #[test]
-    fn a_coordinate_lies_in_the_cell_whose_lower_edge_it_may_be_and_one_in_the_last() {
-        let all = 1 << FINEST;
-        for k in 0..all {
-            let edge = f64::from(k) / f64::from(all);
-            assert_eq!((cell(edge), cell(edge + 1e-12)), (k, k));
-            assert_eq!(cell(edge + 0.999_999 / f64::from(all)), k);
-        }
-        assert_eq!((cell(1.0), cell(1.0 - f64::EPSILON)), (all - 1, all - 1));
-        let beyond = [f64::INFINITY, 1.0 + 1e-9, -1e-17, -3.7, f64::NEG_INFINITY];
-        assert_eq!(beyond.map(cell), [all - 1, all - 1, 0, 0, 0]);
-        assert!(cell(f64::NAN) < all);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Carrier surfaces and the coordinates of rays on them.
 
-use etendue_lightfield::surface::{CarrierPart, Focus, Shape};
+use etendue_lightfield::carrier::{CarrierPart, Disk, Focus, Hemisphere, Rectangle, Shape, Tube};
 use etendue_math::{Frame, Vec3};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -24,14 +24,14 @@ impl Part {
     pub fn core(&self) -> PyResult<CarrierPart> {
         let [a, b] = self.size;
         let shape = match self.shape.as_str() {
-            "rectangle" => Shape::Rectangle {
+            "rectangle" => Shape::Rectangle(Rectangle {
                 width: a,
                 height: b,
                 focus: Focus(self.focus),
-            },
-            "disk" => Shape::Disk { radius: a },
-            "hemisphere" => Shape::Hemisphere { radius: a },
-            "tube" => Shape::Tube { radius: a, height: b },
+            }),
+            "disk" => Shape::Disk(Disk { radius: a }),
+            "hemisphere" => Shape::Hemisphere(Hemisphere { radius: a }),
+            "tube" => Shape::Tube(Tube { radius: a, height: b }),
             other => return Err(PyValueError::new_err(format!("no shape is called {other}"))),
         };
         let frame = Frame {
