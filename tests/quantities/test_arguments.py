@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,6 +23,34 @@ EMAP = et.IlluminanceMap(VALUES, VALUES, np.full((4, 4), 100), et.Screen(8, 8, 4
 SCAN = et.GoniometerScan(np.arange(-5.0, 6.0), np.exp(-(np.arange(-5.0, 6.0) ** 2)), solid_angle=1e-3)
 PAINT = et.bsdf.Lambertian(reflectance=0.5)
 NOTHING_KNOWN = ("lamp.ies", None, 3.5, [], {}, LMAP)
+NAMES_GIVEN = ("no such name", 3, ["ies"], {}, np.eye(2), LMAP)
+NO_NAMES = (None, *NAMES_GIVEN)
+LAMP = et.Scene(sources=[{"name": "lamp", "kind": "point", "flux": 1}])
+RINGS, DISK = et.RingSource(rays=100), et.Disk(radius=30)
+VIEW = (et.Observer(0, 0, 1000), et.Screen(60, 60, 2, 2))
+UP = [0.0, 0.0, 1.0]
+SCANS = et.Scans([UP] * 3, [UP] * 3, [0.1, 0.12, 0.11])
+WINDOW = et.DirectionalScan([UP, [0.6, 0.0, 0.8]], [1.0, 0.5], solid_angle=1e-3)
+METER = et.Detector(1e9, 1e5, longest=1.0)
+
+
+@functools.cache
+def field() -> et.LightField:
+    return et.LightField.fit(RINGS, DISK, depths=(1, 1, 1, 1))
+
+
+@functools.cache
+def patches() -> et.GriddedSource:
+    return et.GriddedSource.fit(RINGS, DISK, pixel=30.0, threshold=5.0)
+
+
+@functools.cache
+def run() -> et.NearFieldRun:
+    def disk(points: Any, along: Any) -> Any:
+        return np.where(np.hypot(*points.T[:2]) < 1.0, along[:, 2] > 0.0, 0.0)
+
+    return et.NearFieldGoniophotometer((30, 90), camera_pixels=8).measure(disk, size=3, samples=1)
+
 
 CALLS: dict[str, tuple[Callable[[Any], object], tuple[Any, ...]]] = {
     "beam_angle: intensity": (et.beam_angle, NOTHING_KNOWN),
@@ -209,6 +239,149 @@ CALLS: dict[str, tuple[Callable[[Any], object], tuple[Any, ...]]] = {
         lambda wrong: et.plot_cross_sections([et.cross_section(LMAP, x=0)], labels=wrong),
         (3, "a", LMAP),
     ),
+    # --- scans and BSDFs --------------------------------------------------------------------------------------------------
+    "fit_bsdf: scans": (lambda wrong: et.fit_bsdf(wrong, "lambertian"), (*NOTHING_KNOWN, ["a.csv"])),
+    "model to fit": (lambda wrong: et.fit_bsdf(SCANS, wrong), NO_NAMES),
+    "scans is": (et.Bsdf.from_scans, (*NOTHING_KNOWN, ["a.csv"])),
+    "method of interpolation": (lambda wrong: et.Bsdf.from_scans(SCANS, wrong), NO_NAMES),
+    **{
+        f"Scans: {name} ": (
+            lambda wrong, name=name: et.Scans(
+                **({"incident": [UP], "scattered": [UP], "values": [1.0]} | {name: wrong})
+            ),
+            tuple(wrong for wrong in NO_ARRAYS if name != "standard_error" or wrong is not None),
+        )
+        for name in ("incident", "scattered", "values", "standard_error")
+    },
+    "Scans: reflectance ": (lambda wrong: et.Scans([UP], [UP], [1.0], None, wrong), ("0.5", [0.5], LMAP)),
+    "Scans.from_stages: stages ": (
+        lambda wrong: et.Scans.from_stages(wrong, [1.0], 1.0, solid_angle=1e-3),
+        NO_ARRAYS,
+    ),
+    "Scans.from_stages: solid_angle ": (
+        lambda wrong: et.Scans.from_stages([[0.0, 0.0, 30.0, 0.0]], [1.0], 1.0, solid_angle=wrong),
+        NO_NUMBERS,
+    ),
+    "read_scans: paths ": (et.read_scans, (None, 3, "a.csv", LMAP, Path("a.csv"))),
+    "read_scans: one of the paths ": (et.read_scans, ([None], [3], np.eye(2), [["a.csv"]])),
+    "read_scans: blank ": (lambda wrong: et.read_scans(["a.csv"], blank=wrong), (3, ["a.csv"], LMAP)),
+    "read_scans: solid_angle ": (lambda wrong: et.read_scans(["a.csv"], solid_angle=wrong), ("1", [1.0])),
+    "no file of scans": (et.read_scans, ([], (), iter(()))),
+    "read_bsdf: path ": (et.read_bsdf, (None, 3, LMAP, "a\0b")),
+    "read_bsdf: one of the paths ": (et.read_bsdf, ([None], [3], np.eye(2))),
+    "read_bsdf: there is no file": (et.read_bsdf, ([], {})),
+    "write_bsdf: path ": (lambda wrong: et.write_bsdf(wrong, PAINT), (None, 3, PAINT, ["a.h5"])),
+    "write_bsdf: bsdf ": (lambda wrong: et.write_bsdf("a.h5", wrong), NOTHING_KNOWN),
+    "BSDF format": (lambda wrong: et.write_bsdf("a.h5", PAINT, wrong), NAMES_GIVEN),
+    "BsdfTable: data ": (et.BsdfTable, (*NOTHING_KNOWN, PAINT)),
+    "incident is": (lambda wrong: PAINT.evaluate(wrong, UP), NO_ARRAYS),
+    "scattered is": (lambda wrong: PAINT.pdf(UP, wrong), NO_ARRAYS),
+    "theta is ": (PAINT.reflectance, NO_ARRAYS),
+    "phi is ": (lambda wrong: PAINT.transmittance(10.0, wrong), NO_ARRAYS),
+    "wavelength is": (lambda wrong: PAINT.reflectance(10.0, wavelength=wrong), NO_NUMBERS),
+    "media is": (lambda wrong: PAINT.reflectance(10.0, media=wrong), (*NO_ARRAYS, 1.5, [1.0], [1.0, 0.0])),
+    "unknown side": (lambda wrong: PAINT.known_to(side=wrong), NO_NAMES),
+    "n is": (lambda wrong: PAINT.sample(UP, wrong), (*NO_NUMBERS, -1, 1e6, True)),
+    # --- instruments ------------------------------------------------------------------------------------------------------
+    "unknown operator": (lambda wrong: et.deconvolve(SCAN, SCAN, operator=wrong), NO_NAMES),
+    "unknown method": (lambda wrong: et.deconvolve(SCAN, SCAN, method=wrong), NAMES_GIVEN),
+    "replicates is": (lambda wrong: et.deconvolve(SCAN, SCAN, replicates=wrong), (*NO_NUMBERS, -1, 1, 2.5, 10**9)),
+    "deconvolve: middle is": (lambda wrong: et.deconvolve(SCAN, SCAN, middle=wrong), (np.nan, np.inf, 1e9)),
+    "stop: the number of iterations is": (lambda wrong: et.deconvolve(SCAN, SCAN, stop=wrong), (True, 0, -1)),
+    "the middle of the lobe, nan": (lambda wrong: et.revolved(SCAN, middle=wrong), (np.nan,)),
+    "deconvolve_directions: models ": (
+        lambda wrong: et.deconvolve_directions(WINDOW, models=wrong),
+        (None, 3, "gaussian", LMAP),
+    ),
+    "a solid angle of inf": (lambda wrong: dataclasses.replace(SCAN, solid_angle=wrong), (np.inf,)),
+    "a background of inf": (lambda wrong: dataclasses.replace(WINDOW, background=wrong), (np.inf,)),
+    "DirectionalScan.extent: cell ": (WINDOW.extent, NO_NUMBERS),
+    "Detector.exposures: flux ": (METER.exposures, (*NO_ARRAYS, 1.0, np.eye(2))),
+    "seed is": (lambda wrong: METER.read([1.0], wrong), (*NO_NUMBERS, -1, 1.5, True)),
+    "Baffle.field: aperture ": (lambda wrong: et.Baffle(24, 200).field(wrong, 500.0), NO_NUMBERS),
+    "Baffle.field: distance ": (lambda wrong: et.Baffle(24, 200).field(25.0, wrong), NO_NUMBERS),
+    "Baffle.etendue: aperture ": (et.Baffle(24, 200).etendue, (*NO_NUMBERS, 0, np.nan, np.inf)),
+    "rays is": (lambda wrong: et.ScatterGoniometer().measure(PAINT, rays=wrong), (*NO_NUMBERS, 0, 1e6, 10**30)),
+    "span is": (lambda wrong: et.ScatterGoniometer().instrument_function(span=wrong), ("6", [6.0], LMAP)),
+    "turn is": (lambda wrong: et.ScatterGoniometer().measure_window(PAINT, turn=wrong), NO_NUMBERS),
+    "the step over a hemisphere is": (
+        lambda wrong: et.ScatterGoniometer().measure_hemisphere(PAINT, step=wrong),
+        NO_NUMBERS,
+    ),
+    "directions ": (
+        lambda wrong: et.ScatterGoniometer().measure_directions(PAINT, wrong),
+        (*NO_ARRAYS, 1.0, [0.0, 0.0, 1.0]),
+    ),
+    "size is": (
+        lambda wrong: et.NearFieldGoniophotometer().measure(len, size=wrong),
+        ("3", [3.0], LMAP, 0.0, -1.0, np.nan, np.inf),
+    ),
+    # --- sources and light fields -----------------------------------------------------------------------------------------
+    "unknown symmetry": (lambda wrong: et.LightField.fit(RINGS, DISK, symmetry=wrong), NO_NAMES),
+    "LightField.fit: depths": (
+        lambda wrong: et.LightField.fit(RINGS, DISK, depths=wrong),
+        ("2222", 2, (2, 2), (2, 2, 2, 2.5), (2, 2, 2, -1), (2, 2, 2, 17), [[2, 2], [2, 2]], [[2], [2, 2]], {}, LMAP),
+    ),
+    "FieldRays: the number of rays is": (lambda wrong: field().rays(wrong), (*NO_NUMBERS, 0, 1e6)),
+    "points is": (lambda wrong: field().luminance(wrong, [UP]), NO_ARRAYS),
+    "directions is": (lambda wrong: field().pdf([UP], wrong), NO_ARRAYS),
+    "c_planes is": (lambda wrong: field().intensity(wrong, 30.0), ("4", [4], 1.5, 0, LMAP)),
+    "gamma_step is ": (lambda wrong: patches().intensity(4, wrong), (*NO_NUMBERS, 7.0, np.nan)),
+    "give the path of a file": (lambda wrong: field().save(wrong), (None, 3, LMAP, ["a.h5"], "a\0b")),
+    "coarsest bins": (
+        lambda wrong: et.GriddedSource.fit(RINGS, DISK, coarsest_bins=wrong),
+        (None, 30, "30", (), (30, 90, 1), np.eye(2), (31, 90), LMAP),
+    ),
+    "place of the lattice": (lambda wrong: et.GriddedSource.fit(RINGS, DISK, centre_on=wrong), NO_NAMES),
+    "sample: n ": (lambda wrong: patches().sample(wrong, 1), (*NO_NUMBERS, 0, 1e6, 10**30)),
+    "flux is ": (lambda wrong: patches().emitting(wrong), (*NO_NUMBERS, 0.0, np.nan)),
+    "luminance: points": (lambda wrong: patches().luminance(wrong, [UP]), NO_ARRAYS),
+    "folder is": (et.GriddedSource.load, (None, 3, LMAP)),
+    "scenes is": (lambda wrong: patches().save_patches("a", scenes=wrong), (None, 3, LMAP)),
+    "format of patches": (lambda wrong: patches().save_patches("a", wrong), NO_NAMES),
+    "rays is ": (et.Disk().sized_for, NOTHING_KNOWN),
+    "RayIndex.build: rays ": (et.RayIndex.build, NOTHING_KNOWN),
+    "RingSource.luminance: x ": (lambda wrong: RINGS.luminance(wrong, 0.0), NO_ARRAYS),
+    "RingSource: observer ": (lambda wrong: RINGS.pixel_luminance(wrong, VIEW[1]), NOTHING_KNOWN),
+    "RingSource: subdivision ": (lambda wrong: RINGS.pixel_luminance(*VIEW, wrong), (*NO_NUMBERS, 0, -1, 1.5, 10**9)),
+    "batches: size ": (lambda wrong: next(RINGS.batches(wrong)), (*NO_NUMBERS, 0, 1.5)),
+    "offset is": (RINGS.ray_set().moved, (*NO_ARRAYS, (1.0, 2.0))),
+    "rotated: angle ": (lambda wrong: RINGS.ray_set().rotated(UP, wrong), NO_NUMBERS),
+    "propagated_to_sphere: radius ": (lambda wrong: RINGS.ray_set().propagated_to_sphere(UP, wrong), NO_NUMBERS),
+    "flux unit": (lambda wrong: RINGS.ray_set().with_total_flux(1.0, wrong), ("", 0, [], {}, np.eye(2), "lx")),
+    # --- scenes, maps and tables ------------------------------------------------------------------------------------------
+    "trace_work: before ": (lambda wrong: et.trace_work(LAMP, 10, before=wrong), (3, "a.h5", LMAP, LAMP)),
+    "TraceWork: the number": (et.trace_work(LAMP, 10), NO_NUMBERS),
+    "TraceWork.join: units ": (et.trace_work(LAMP, 10).join, (None, 3, LMAP)),
+    "TraceWork.join: one of the units ": (et.trace_work(LAMP, 10).join, ("abc", [None], [LMAP])),
+    "TraceWork.join: start ": (lambda wrong: et.trace_work(LAMP, 10).join([], wrong), ("a.h5", 3, LMAP)),
+    "unknown detector": (lambda wrong: et.trace(LAMP, 10).quantity_of(wrong), NO_NAMES),
+    "Scene.from_dict: data ": (et.Scene.from_dict, (None, 3, "a.toml", LAMP, [("name", "a")])),
+    "compile_scene: scene ": (et.scene.compile_scene, NOTHING_KNOWN),
+    "section is": (lambda wrong: et.draw_scene(LAMP, section=wrong), ([3], [None], [["y=0"]])),
+    "Screen: observer ": (VIEW[1].axes, NOTHING_KNOWN),
+    "Region: screen ": (SQUARE.mask, NOTHING_KNOWN),
+    "LuminanceMap: observer ": (lambda wrong: LMAP.replace(observer=wrong), NOTHING_KNOWN),
+    "LuminanceMap: provenance ": (lambda wrong: LMAP.replace(provenance=wrong), NOTHING_KNOWN),
+    "Intensity: provenance ": (lambda wrong: TABLE.replace(provenance=wrong), NOTHING_KNOWN),
+    "RaySet: provenance ": (lambda wrong: RINGS.ray_set().replace(provenance=wrong), NOTHING_KNOWN),
+    "acceptance is": (lambda wrong: et.Cone(acceptance=wrong), (np.eye(2), "wide", [1.0], LMAP)),
+    "surface is": (lambda wrong: et.FromField(surface=wrong), (np.eye(2), "disk", None, LMAP)),
+    "intensity format that can be written": (lambda wrong: et.write_intensity("a.ies", TABLE, wrong), NAMES_GIVEN),
+    "write_intensity: rotate ": (lambda wrong: et.write_intensity("a.ies", TABLE, rotate=wrong), NO_NUMBERS),
+    "path is ": (LMAP.save, (None, 3, LMAP, ["a.npz"], "a\0.npz")),
+    "SweepTable: parameters ": (lambda wrong: et.SweepTable(wrong, {}, {}, {}, 0), (None, 3, "a", [1.0])),
+    "SweepTable: done ": (lambda wrong: et.SweepTable({"a": [1.0]}, {}, {}, {}, wrong), NO_NUMBERS),
+    "plot_cross_sections: one of the labels": (
+        lambda wrong: et.plot_cross_sections([et.cross_section(LMAP, x=0)], labels=wrong),
+        ([None], [3]),
+    ),
+    "plot_near_field: c is": (lambda wrong: et.plot_near_field(run(), c=wrong), (*NO_NUMBERS, np.nan, np.inf)),
+    "NearFieldRun.luminance_map: gamma is": (lambda wrong: run().luminance_map(wrong), (*NO_NUMBERS, np.nan)),
+    "NearFieldRun.ray_set: rays ": (lambda wrong: run().ray_set(wrong), ("9", [9], 0, 1e6, LMAP)),
+    "NearFieldRun.using: exposures ": (lambda wrong: run().using(wrong), (*NO_NUMBERS, 0, 2)),
+    "exposures_needed: error ": (lambda wrong: run().exposures_needed(wrong), NO_NUMBERS),
+    "sees_light: position ": (lambda wrong: run().sees_light(wrong), (*NO_NUMBERS, -1, 10**6)),
 }
 """By what the message begins with or names: a call, and what it refuses."""
 
@@ -225,9 +398,6 @@ def test_the_message_names_the_argument(name: str, tmp_path: Path, monkeypatch: 
     assert not list(tmp_path.iterdir())
 
 
-LAMP = et.Scene(sources=[{"name": "lamp", "kind": "point", "flux": 1}])
-RINGS, DISK = et.RingSource(rays=100), et.Disk(radius=30)
-VIEW = (et.Observer(0, 0, 1000), et.Screen(60, 60, 2, 2))
 WITH_PROGRESS: dict[str, Callable[[Any], object]] = {
     "luminance_map": lambda wrong: et.luminance_map(RINGS, *VIEW, progress=wrong),
     "intensity_distribution": lambda wrong: et.intensity_distribution(RINGS, progress=wrong),

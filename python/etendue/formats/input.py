@@ -15,7 +15,7 @@ from pathlib import Path, PosixPath
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.output import naming
 from etendue.formats.temporary import temporary_beside
-from etendue.quantities.arguments import described
+from etendue.quantities.arguments import require_path
 from etendue.quantities.report import ChangedFileWarning
 
 STREAM_LIMIT = 64 << 30
@@ -75,8 +75,7 @@ def require_file(path: Path, why: str) -> None:
 
 def as_path(path: str | os.PathLike[str]) -> Path:
     """A path as such, and the path of a pipe as that: `Path` would forget where its bytes are."""
-    if not isinstance(path, str | os.PathLike):
-        raise ArgumentError(f"path is {described(path)}; give the path of a file.")
+    require_path(path)
     return path if isinstance(path, Path) else Path(path)
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from etendue.errors import ArgumentError, OutputError
 from etendue.formats.temporary import PATTERN, temporary_beside
+from etendue.quantities.arguments import require_path
 
 
 @contextlib.contextmanager
@@ -50,6 +51,7 @@ def atomic_output(path: str | os.PathLike[str], size: int | None = None) -> Iter
     ...     target.read_text(), len(list(target.parent.iterdir()))
     ('row,column\n', 1)
     """
+    require_path(path)
     target = _destination(Path(path))
     with naming(target), temporary_beside(target) as temporary:
         if size is not None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from etendue.errors import ArgumentError
 from etendue.formats.output import naming
 from etendue.formats.temporary import temporary_beside
+from etendue.quantities.arguments import require_path
 
 
 def check_output_folder(path: str | os.PathLike[str], replaceable: Callable[[Path], bool]) -> None:
@@ -29,6 +30,7 @@ def check_output_folder(path: str | os.PathLike[str], replaceable: Callable[[Pat
     ArgumentError
         If `path` is a file or a link, its parent does not exist, or it is a folder with files that is not replaceable.
     """
+    require_path(path, instead="the path of a folder")
     folder = Path(path)
     if not folder.absolute().parent.is_dir():
         raise ArgumentError(f"{folder}: cannot write: {folder.absolute().parent} does not exist. Create it first.")

@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, FormatError, UnknownNameError
+from etendue.errors import ArgumentError, FormatError
 from etendue.formats.intensity import INTENSITY_FORMATS, read_intensity
 from etendue.formats.output_folder import atomic_folder, check_output_folder
 from etendue.formats.scenes import SCENES
 from etendue.formats.strict_json import strict_json
+from etendue.quantities.arguments import require, require_known, require_path
 from etendue.quantities.patches import AngularGrid, Patches
 
 MANIFEST = "manifest.json"
@@ -42,11 +43,9 @@ def check_patch_folder(
         If the folder cannot be written or holds something else, or the format does not know the unit of flux.
     """
     check_output_folder(folder, is_patch_folder)
-    if format not in PATCH_FORMATS:
-        raise UnknownNameError("format of patches", format, PATCH_FORMATS)
+    require_known(format, PATCH_FORMATS, "format of patches")
     for scene in scenes:
-        if scene not in SCENES:
-            raise UnknownNameError("ray tracer", scene, SCENES)
+        require_known(scene, SCENES, "ray tracer")
     if format == "ldt" and flux_unit != "lm":
         raise ArgumentError("EULUMDAT knows luminous intensity only, and these rays are in watts; write ies files.")
 
@@ -94,7 +93,8 @@ def write_patch_folder(
     ArgumentError
         If the folder cannot be written or holds something else, or the format does not know the unit of flux.
     """
-    scenes = tuple(dict.fromkeys(scenes))
+    require(scenes, Iterable, "scenes", f"a list of ray tracers of {', '.join(SCENES)}")
+    scenes = tuple(scenes)
     check_patch_folder(folder, patches.flux_unit, format, scenes)
     rows = list(_rows(patches, format))
     with atomic_folder(folder, is_patch_folder) as temporary:
@@ -103,7 +103,7 @@ def write_patch_folder(
         assert writer is not None  # noqa: S101 - both are formats that are written
         for i, row in enumerate(rows):
             writer(patches.intensity(i), temporary / row["file"])
-        for scene in scenes:
+        for scene in dict.fromkeys(scenes):
             (temporary / scene).mkdir()
             SCENES[scene](patches, temporary / scene, factor)
         _write_table(temporary / "manifest.csv", rows)
@@ -156,8 +156,8 @@ def read_patch_folder(folder: str | os.PathLike[str]) -> PatchFolder:
     FormatError
         If the manifest or one of the files that it names is missing or damaged.
     """
-    folder = Path(folder)
-    path = folder / MANIFEST
+    require_path(folder, "folder", "the path of a folder of patches")
+    path = Path(folder) / MANIFEST
     try:
         found = strict_json(path.read_bytes())
     except OSError as error:

@@ -9,8 +9,8 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
-from etendue.quantities.arguments import as_numbers
+from etendue.errors import ArgumentError
+from etendue.quantities.arguments import as_numbers, require_known
 from etendue.quantities.quadrature import gauss_legendre
 
 Array = npt.NDArray[np.float64]
@@ -51,8 +51,7 @@ class Aperture:
     inner: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.shape not in get_args(Shape):
-            raise UnknownNameError("shape of an aperture", self.shape, get_args(Shape))
+        require_known(self.shape, get_args(Shape), "shape of an aperture")
         if self.shape == "ring" and not 0.0 < self.inner < self.diameter:
             raise ArgumentError(
                 f"a ring-shaped aperture from {self.inner:g} to {self.diameter:g} mm; give an inner diameter above 0 mm and "
@@ -136,8 +135,7 @@ class Beam:
 
     def __post_init__(self) -> None:
         if isinstance(self.profile, str):
-            if self.profile not in ("uniform", "gaussian"):
-                raise UnknownNameError("profile of a beam", self.profile, ("uniform", "gaussian"))
+            require_known(self.profile, ("uniform", "gaussian"), "profile of a beam")
         else:
             wanted = "'uniform', 'gaussian', or two or more values from the middle to the edge"
             values = as_numbers(self.profile, "the profile of a beam", wanted)

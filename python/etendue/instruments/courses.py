@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.instruments.richardson_lucy import deviances, iterations
 from etendue.instruments.stopping import MOST, NEEDS_COUNTS, RULES, Course
-from etendue.quantities.arguments import require
+from etendue.quantities.arguments import as_whole, require, require_known
 
 Array = npt.NDArray[np.float64]
 
@@ -30,6 +30,28 @@ MOST_COUNTS = 2.0**53
 """At a position that can be parted: more have errors of rounding, as quadratures do, and go together in lots."""
 
 
+MOST_REPLICATES = 10_000
+
+
+def checked_replicates(given: int) -> int:
+    """How many scans are drawn that errors are made of.
+
+    Raises
+    ------
+    ArgumentError
+        If it is no whole number, one, which has no spread, or too many.
+
+    Examples
+    --------
+    >>> checked_replicates(0), checked_replicates(32)
+    (0, 32)
+    """
+    found = as_whole(given, "replicates", 0, MOST_REPLICATES)
+    if found == 1:
+        raise ArgumentError("replicates is 1, and one scan has no spread; give 2 or more, or 0 for no errors.")
+    return found
+
+
 def rule_of(stop: str | int | None, *, counted: bool) -> str:
     """The name of a rule, or a number of iterations as text; the default where nothing is said.
 
@@ -46,14 +68,11 @@ def rule_of(stop: str | int | None, *, counted: bool) -> str:
     ('held-out', 'thesis', '12 iterations')
     """
     if isinstance(stop, int):
-        if not 1 <= stop <= LARGEST_ITERATIONS:
-            raise ArgumentError(f"{stop} iterations; give 1 to {LARGEST_ITERATIONS}")
-        return f"{stop} iterations"
+        return f"{as_whole(stop, 'stop: the number of iterations', 1, LARGEST_ITERATIONS)} iterations"
     if stop is None:
         return next(iter(RULES)) if counted else "thesis"
     require(stop, str, "stop", f"a number of iterations, or one of {', '.join(RULES)}")
-    if stop not in RULES:
-        raise UnknownNameError("rule", stop, RULES)
+    require_known(stop, RULES, "rule")
     if not counted and stop in NEEDS_COUNTS:
         raise ArgumentError(f"the rule {stop!r} needs the standard errors of the scan; 'thesis' and 'plateau' do not")
     return stop

@@ -10,13 +10,13 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.formats.output import atomic_output
-from etendue.instruments.courses import after, course_of, rule_of
+from etendue.instruments.courses import after, checked_replicates, course_of, rule_of
 from etendue.instruments.goniometer_scan import GoniometerScan, full_width, summit, total_scatter
 from etendue.instruments.operators import Operator, OperatorName, folded, middle_of, operator_of, sparse_if_large
 from etendue.instruments.penalised_lobe import PenalisedLobe, penalised_lobe
-from etendue.quantities.arguments import require, require_number
+from etendue.quantities.arguments import require, require_known, require_number
 from etendue.quantities.ray_stream import checked_seed
 
 Array = npt.NDArray[np.float64]
@@ -24,6 +24,9 @@ Method = Literal["penalised", "richardson-lucy", "matrix"]
 
 REPLICATES = 32
 """Scans that error bands are made of."""
+
+FURTHEST_MIDDLE = 180.0
+"""Angle [°] up to which the middle of a lobe may be stated: that of half a scan may lie beside it."""
 
 FURTHER = 4
 """Times the iterations after which a lobe stands for the truth when errors are estimated."""
@@ -198,8 +201,10 @@ def deconvolve(
     >>> bool(abs(after / before - 1) < 1e-6)
     True
     """
-    if method is not None and method not in get_args(Method):
-        raise UnknownNameError("method", method, get_args(Method))
+    if method is not None:
+        require_known(method, get_args(Method), "method")
+    require_known(operator, get_args(OperatorName), "operator")
+    replicates = checked_replicates(replicates)
     if stop is not None and method not in {None, "richardson-lucy"}:
         raise ArgumentError(f"a stop is for method='richardson-lucy'; {method!r} does not iterate")
     for name, given in (("scan", scan), ("signature", signature)):
@@ -208,6 +213,8 @@ def deconvolve(
         )
     if middle is not None:
         require_number(middle, "deconvolve: middle", "an angle in °, or None")
+        if not abs(middle) <= FURTHEST_MIDDLE:
+            raise ArgumentError(f"deconvolve: middle is {middle:g}; give an angle in ° from −180 to 180, or None.")
     notes = list(scan.notes)
     if scan.angle.size < 5:
         raise ArgumentError(f"a scan of {scan.angle.size} positions; five are needed at least")

@@ -43,7 +43,7 @@ class DetectorHead:
     distance: float
 
     def __post_init__(self) -> None:
-        if not self.diameter >= 0.0:
+        if not 0.0 <= self.diameter < np.inf:
             raise ArgumentError(f"a head of the detector of {self.diameter:g} mm; give its diameter, 0 or more")
 
     def shadows(self, arms: Array, theta: float) -> npt.NDArray[np.bool_]:

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.quantities.arguments import as_numbers, require_numbers
+from etendue.quantities.arguments import as_numbers, require_number, require_numbers
+from etendue.quantities.ray_stream import checked_seed
 
 Array = npt.NDArray[np.float64]
 
@@ -132,7 +133,9 @@ class Detector:
 
     def exposures(self, flux: npt.ArrayLike) -> tuple[Array, Array]:
         """Times [s] and transmittances of filters for fluxes, shape (n,) each: an automatic exposure, found in the pause."""
-        share = np.asarray(flux, np.float64) + self.stray
+        share = as_numbers(flux, "Detector.exposures: flux", "fluxes as a share of that of the beam") + self.stray
+        if share.ndim != 1:
+            raise ArgumentError(f"Detector.exposures: flux has shape {share.shape}; give a row of numbers.")
         if self.shortest == self.longest:
             return np.full(share.shape, self.shortest), np.full(share.shape, float(self.filters[0]))
         clear = np.sort(np.asarray(self.filters, np.float64))[::-1]
@@ -169,8 +172,7 @@ class Detector:
         share = as_numbers(flux, "Detector.read: flux", "fluxes as a share of that of the beam")
         if share.ndim != 1 or not np.isfinite(share).all() or (share < 0.0).any():
             raise ArgumentError("fluxes are a row of numbers that are not negative")
-        if seed < 0:
-            raise ArgumentError(f"a seed of {seed}; give 0 or more")
+        seed = checked_seed(seed)
         rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 3))))
         seconds, transmittance = self.exposures(share)
         distinct, own = np.unique(transmittance, return_inverse=True)
@@ -218,6 +220,10 @@ class Baffle:
 
         From lines through the rims of both.
         """
+        require_number(aperture, "Baffle.field: aperture", "a diameter in mm")
+        require_number(distance, "Baffle.field: distance", "a length in mm")
+        if not (0.0 < aperture < math.inf and distance < math.inf):
+            raise ArgumentError(f"an aperture of {aperture:g} mm, seen at {distance:g} mm; give lengths above 0")
         if not 0.0 < self.length < distance:
             raise ArgumentError(f"a baffle {self.length:g} mm before the aperture; the sample is at {distance:g} mm")
         straight, crossed = self.opening * distance, aperture * (distance - self.length)
@@ -228,6 +234,9 @@ class Baffle:
 
         Even surroundings of the radiance L send L times this into the detector.
         """
+        require_number(aperture, "Baffle.etendue: aperture", "a diameter in mm")
+        if not 0.0 < aperture < math.inf:
+            raise ArgumentError(f"Baffle.etendue: aperture is {aperture:g}; give a diameter in mm, above 0.")
         r1, r2 = 0.5 * aperture / self.length, 0.5 * self.opening / self.length
         x = 1.0 + (1.0 + r2 * r2) / (r1 * r1)
         factor = 0.5 * (x - math.sqrt(x * x - 4.0 * (r2 / r1) ** 2))

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, EtendueError, UnknownNameError
+from etendue.errors import ArgumentError, EtendueError
 from etendue.extras import scipy_part
 from etendue.formats.output import atomic_output
 from etendue.formats.scans_csv import ERROR
 from etendue.instruments.bench import Bench
 from etendue.instruments.counted_scan import CountedScan, Shrink
-from etendue.instruments.courses import rule_of
+from etendue.instruments.courses import checked_replicates, rule_of
 from etendue.instruments.directional_bands import error_of
 from etendue.instruments.directional_operator import ForwardModel, Instrument, forward_model
 from etendue.instruments.directional_scan import DirectionalScan, angles_of
@@ -28,9 +28,10 @@ from etendue.instruments.regular_share import RegularShare, regular_share
 from etendue.instruments.round_blur import RoundBlur
 from etendue.instruments.scatter_goniometer import ScatterGoniometer
 from etendue.instruments.total_variation import STRENGTHS, total_variation
-from etendue.quantities.arguments import require, require_number
+from etendue.quantities.arguments import described, require, require_known, require_number
 from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.quantities.ray_stream import checked_seed
+from etendue.scatter.bsdf import unit_vectors
 from etendue.scatter.lobe_models import LOBE_MODELS, Fitted
 
 Array = npt.NDArray[np.float64]
@@ -132,7 +133,7 @@ class DirectionalDeconvolution:
 
     def evaluate(self, directions: npt.ArrayLike) -> Array:
         """F [1/sr] at directions of shape (…, 3) on the side of the scan; NaN where it says nothing."""
-        d = np.asarray(directions, np.float64)
+        d = unit_vectors("directions", directions)
         return np.asarray(self.lobe(d.reshape(-1, 3)).reshape(d.shape[:-1]))
 
     def slice(self) -> BsdfSlice:
@@ -237,11 +238,12 @@ def deconvolve_directions(
     >>> bool(27 < found.peak < 33)                                             # a/b = 30
     True
     """
-    if method not in get_args(DirectionalMethod):
-        raise UnknownNameError("method", method, get_args(DirectionalMethod))
-    require(replicates, int, "deconvolve_directions: replicates", "a whole number, 0 or 2 and more")
-    if replicates and replicates < 2:
-        raise ArgumentError("one replicate has no spread; draw two or more, or none")
+    require_known(method, get_args(DirectionalMethod), "method")
+    replicates = checked_replicates(replicates)
+    wanted = f"a list of {', '.join(LOBE_MODELS)}"
+    if isinstance(models, str):
+        raise ArgumentError(f"deconvolve_directions: models is {described(models)}; give {wanted}.")
+    require(models, Iterable, "deconvolve_directions: models", wanted)
     seed = checked_seed(seed)
     require(scan, DirectionalScan, "deconvolve_directions: scan", "a DirectionalScan: et.read_directional_scan(path)")
     if instrument is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 import os
 
 import numpy as np
@@ -17,7 +18,7 @@ from etendue.formats.scans_csv import DIRECTIONS, ERROR, POLAR, read_columns, re
 from etendue.instruments.bench import Bench
 from etendue.instruments.goniometer_scan import GoniometerScan, Way, flux_of_unit_bsdf, known_of, read_goniometer_scan
 from etendue.instruments.lobe_table import polar_slice
-from etendue.quantities.arguments import as_numbers, require_numbers
+from etendue.quantities.arguments import as_numbers, require_number, require_numbers
 from etendue.quantities.bsdf_directions import direction, light_from
 from etendue.quantities.bsdf_slice import BsdfSlice
 
@@ -114,9 +115,9 @@ class DirectionalScan:
         require_numbers(self, "solid_angle", none=True)
         if not 0.0 <= self.incidence < 90.0:
             raise ArgumentError(f"an angle of incidence of {self.incidence:g}°; give 0 to below 90°")
-        if self.solid_angle is not None and not self.solid_angle > 0.0:
+        if self.solid_angle is not None and not 0.0 < self.solid_angle < math.inf:
             raise ArgumentError(f"a solid angle of {self.solid_angle} sr; give more than 0")
-        if not self.background >= 0.0:
+        if not 0.0 <= self.background < math.inf:
             raise ArgumentError(f"a background of {self.background}; give 0 or more")
 
     def __repr__(self) -> str:
@@ -204,6 +205,7 @@ class DirectionalScan:
 
     def extent(self, cell: float) -> dict[str, float]:
         """Detail of width `cell` [°] and distance of the farthest position, in direction cosines."""
+        require_number(cell, "DirectionalScan.extent: cell", "an angle in °")
         off = self.direction[:, :2] - self.regular[:2]
         fine = np.radians(cell) * abs(float(self.regular[2]))
         return {"cell": float(fine), "farthest": float(np.hypot(*off.T).max())}

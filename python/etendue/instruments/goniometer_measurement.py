@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.instruments.bench import Bench
 from etendue.instruments.detector_head import DetectorHead
 from etendue.instruments.directional_scan import DirectionalScan
@@ -17,7 +17,7 @@ from etendue.instruments.photon_counter import PhotonCounter
 from etendue.instruments.positions import Plane, detector_directions, even_angles
 from etendue.instruments.ray_counting import counted_flux
 from etendue.instruments.sight_quadrature import integrated_flux
-from etendue.quantities.arguments import require_number
+from etendue.quantities.arguments import require_known, require_number
 from etendue.quantities.bsdf_directions import direction, light_from
 from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.quantities.polar_grid import PolarGrid
@@ -95,8 +95,7 @@ class Measurement:
     fresh: bool = False
 
     def __post_init__(self) -> None:
-        if self.method not in get_args(Method):
-            raise UnknownNameError("method", self.method, get_args(Method))
+        require_known(self.method, get_args(Method), "method")
         require_number(self.theta, "theta", "an angle of incidence from 0 to below 90°")
         if not 0.0 <= self.theta < 90.0:
             raise ArgumentError(f"an angle of incidence of {self.theta:g}°; give 0 to below 90°")

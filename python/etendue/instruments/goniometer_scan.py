@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,13 +13,13 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, FormatError, UnknownNameError
+from etendue.errors import ArgumentError, FormatError
 from etendue.formats.input import as_path
 from etendue.formats.output import atomic_output
 from etendue.formats.scans_csv import DIRECTIONS, ERROR, POSITIONS, read_columns, read_remarks
 from etendue.instruments.positions import Plane, detector_directions
 from etendue.instruments.ring_sum import sum_of_rings
-from etendue.quantities.arguments import as_numbers, require_numbers
+from etendue.quantities.arguments import as_numbers, require_known, require_numbers
 from etendue.quantities.bsdf_directions import light_from
 from etendue.scatter.scans.scans import Scans
 
@@ -143,13 +144,11 @@ class GoniometerScan:
         require_numbers(self, "solid_angle", none=True)
         if not 0.0 <= self.incidence < 90.0:
             raise ArgumentError(f"incidence is {self.incidence:g}°; light meets a sample at 0 to below 90°")
-        if self.way not in get_args(Way):
-            raise UnknownNameError("way", self.way, get_args(Way))
-        if self.plane not in get_args(Plane):
-            raise UnknownNameError("plane", self.plane, get_args(Plane))
-        if self.solid_angle is not None and not self.solid_angle > 0.0:
+        require_known(self.way, get_args(Way), "way")
+        require_known(self.plane, get_args(Plane), "plane")
+        if self.solid_angle is not None and not 0.0 < self.solid_angle < math.inf:
             raise ArgumentError(f"a solid angle of {self.solid_angle} sr; give more than 0")
-        if not self.background >= 0.0:
+        if not 0.0 <= self.background < math.inf:
             raise ArgumentError(f"a background of {self.background}; give 0 or more")
 
     def __repr__(self) -> str:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.extras import scipy_part
 from etendue.instruments.goniometer_scan import GoniometerScan
 from etendue.quantities.quadrature import gauss_legendre
@@ -173,13 +173,9 @@ def operator_of(scan: GoniometerScan, signature: GoniometerScan, name: OperatorN
 
     Raises
     ------
-    UnknownNameError
-        If there is no such operator.
     ArgumentError
         If the instrument function is wider than the scan or holds no light.
     """
-    if name not in get_args(OperatorName):
-        raise UnknownNameError("operator", name, get_args(OperatorName))
     radius, blur = folded(signature)
     reach = float(radius[-1])
     angle = scan.angle - middle

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 import numpy.typing as npt
@@ -42,11 +43,11 @@ class PhotonCounter:
     drift: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.photons is not None and not self.photons > 0.0:
+        if self.photons is not None and not 0.0 < self.photons < math.inf:
             raise ArgumentError(f"{self.photons} photons; give more than 0, or None for no noise")
         if self.dark < 0.0 or (self.dark and self.photons is None):
             raise ArgumentError("dark counts are given without photons, or are negative; give both, and none below 0")
-        if not self.drift > -1.0:
+        if not -1.0 < self.drift < math.inf:
             raise ArgumentError(f"a drift of {self.drift:g}; give more than -1, at which nothing is left of the beam")
 
     @property

@@ -92,6 +92,7 @@ def hemisphere(step: float) -> PolarGrid:
     >>> hemisphere(30.0).radial.tolist()
     [0.0, 30.0, 60.0]
     """
+    require_number(step, "the step over a hemisphere", f"an angle from {FINEST:g} to {COARSEST:g}°")
     if not FINEST <= step <= COARSEST:
         raise ArgumentError(f"steps of {step:g}° over a hemisphere; give {FINEST:g} to {COARSEST:g}°")
     polar = np.arange(0.0, 90.0 - min(0.5 * step, 5.0) + 1e-9, step)

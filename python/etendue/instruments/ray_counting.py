@@ -5,13 +5,17 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError
 from etendue.instruments.beam_and_aperture import axes_of, into_the_sample
 from etendue.instruments.bench import Bench
+from etendue.quantities.arguments import as_whole
 from etendue.quantities.bsdf_directions import direction
+from etendue.quantities.ray_stream import checked_seed
 from etendue.scatter.bsdf import Bsdf
 
 Array = npt.NDArray[np.float64]
+
+MOST_RAYS = (1 << 40) - 1
+"""That may be drawn: days of work."""
 
 BLOCK = 1 << 20
 """Rays that are traced together; what a scan takes of memory does not grow with its rays."""
@@ -107,7 +111,7 @@ def counted_flux(
     Raises
     ------
     ArgumentError
-        If there are no rays, or the seed is negative.
+        If the number of rays or the seed is no whole number, or out of its range.
 
     Examples
     --------
@@ -120,10 +124,7 @@ def counted_flux(
     >>> bool(abs(share[0] - goniometer.solid_angle / np.pi) < 4 * error[0])
     True
     """
-    if rays < 1:
-        raise ArgumentError(f"{rays} rays; draw at least one")
-    if seed < 0:
-        raise ArgumentError(f"a seed of {seed}; give 0 or more")
+    rays, seed = as_whole(rays, "rays", 1, MOST_RAYS), checked_seed(seed)
 
     def leaving(n: int, number: tuple[int, ...]) -> tuple[Array, Array]:
         """Where rays leave the sample [mm] and to where, shape (n, 3) each; NaN where they are absorbed."""

@@ -74,7 +74,7 @@ def revolved(
         raise ArgumentError("a lobe needs five positions, and some light")
     at = middle_of(scan.angle, np.maximum(f * scan.cosine, 0.0)) if middle is None else float(middle)
     reach = min(at - scan.angle[0], scan.angle[-1] - at)
-    if reach <= 0.0:
+    if not reach > 0.0:
         raise ArgumentError(f"the middle of the lobe, {at:g}°, is outside the scan")
     ring = scan.step / PER_STEP
     radial = np.arange(0.0, reach + 1e-9, ring)

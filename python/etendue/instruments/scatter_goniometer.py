@@ -8,7 +8,7 @@ from typing import get_args
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.instruments.beam_and_aperture import Aperture, Beam, Profile, Shape
 from etendue.instruments.bench import Bench
 from etendue.instruments.detector_head import DetectorHead
@@ -18,7 +18,7 @@ from etendue.instruments.goniometer_scan import GoniometerScan, Way
 from etendue.instruments.photon_counter import PhotonCounter
 from etendue.instruments.positions import Plane, even_angles, hemisphere, hemisphere_around, window
 from etendue.instruments.turned_sample import TurnedSample
-from etendue.quantities.arguments import as_numbers, require, require_numbers
+from etendue.quantities.arguments import BSDF, as_numbers, require, require_known, require_number, require_numbers
 from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.scatter.bsdf import Bsdf
 
@@ -169,7 +169,9 @@ class ScatterGoniometer:
         """
         if span is None:
             # Two positions more, where there is no light any more.
+            require_number(step, "step", "an angle in °")
             span = (np.ceil(self.bench.reach / step) + 2.0) * step if step > 0.0 else 1.0
+        require_number(span, "span", "an angle in °, or None")
         angle = even_angles(0.0, step, float(span))
         return bare_scan(self.bench, self._counter, angle, wavelength=self.wavelength, rays=rays, seed=seed)
 
@@ -225,8 +227,7 @@ class ScatterGoniometer:
         UnknownNameError
             If there is no such plane, way or method.
         """
-        if plane not in get_args(Plane):
-            raise UnknownNameError("plane", plane, get_args(Plane))
+        require_known(plane, get_args(Plane), "plane")
         way = _way(bsdf, way)
         return self._measurement(bsdf, theta, rays, seed, method, fresh=fresh).scan(plane, step, span, way)
 
@@ -264,8 +265,8 @@ class ScatterGoniometer:
         [0.1591, 0.0955]
         """
         measurement = self._measurement(bsdf, theta, rays, seed, method)
-        arms = as_numbers(directions, "directions", "unit vectors, shape (n, 3)")
-        if arms.ndim != 2 or arms.shape[1] != 3 or not (np.abs(np.einsum("ij,ij->i", arms, arms) - 1.0) < 1e-6).all():
+        arms = _rows(directions)
+        if not (np.abs(np.einsum("ij,ij->i", arms, arms) - 1.0) < 1e-6).all():
             raise ArgumentError("directions are unit vectors, shape (n, 3)")
         return measurement.flux_on_both_sides(arms)
 
@@ -331,7 +332,7 @@ class ScatterGoniometer:
             As of `measure`; if directions are no unit vectors, or none is left.
         """
         measurement = self._measurement(bsdf, theta, rays, seed, method, turn=turn, fresh=fresh)
-        return measurement.directional_scan(np.array(directions, np.float64))
+        return measurement.directional_scan(_rows(directions))
 
     def measure_window(
         self,
@@ -387,6 +388,8 @@ class ScatterGoniometer:
         fresh: bool = False,
     ) -> Measurement:
         """Of a sample that is turned about its normal [°]."""
+        require(bsdf, Bsdf, "bsdf", BSDF)
+        require_number(turn, "turn", "an angle in °")
         return Measurement(
             bench=self.bench,
             head=self._head,
@@ -401,11 +404,18 @@ class ScatterGoniometer:
         )
 
 
+def _rows(directions: npt.ArrayLike) -> Array:
+    """Directions of a detector, shape (n, 3)."""
+    found = as_numbers(directions, "directions", "unit vectors, shape (n, 3)", copy=True)
+    if found.ndim != 2 or found.shape[1] != 3:
+        raise ArgumentError(f"directions have shape {found.shape}; give unit vectors, shape (n, 3).")
+    return found
+
+
 def _way(bsdf: Bsdf, way: Way | None) -> Way:
-    require(bsdf, Bsdf, "bsdf", "a Bsdf: a model of et.bsdf, or of a file et.read_bsdf(path)")
+    require(bsdf, Bsdf, "bsdf", BSDF)
     if way is not None:
-        if way not in get_args(Way):
-            raise UnknownNameError("way", way, get_args(Way))
+        require_known(way, get_args(Way), "way")
         return way
     mirrored, straight, back, through = bsdf.ways
     if (mirrored or back) and (straight or through):

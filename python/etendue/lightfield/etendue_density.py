@@ -11,9 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.errors import ArgumentError, UnitError, UnknownNameError
+from etendue.errors import ArgumentError, UnitError
 from etendue.lightfield.carrier import Surface
 from etendue.lightfield.counting import FloatArray
+from etendue.quantities.arguments import as_numbers, require_known
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import checked_threads
 from etendue.quantities.spectral_lines import SpectralLines
@@ -200,8 +201,7 @@ class EtendueDensity:
         >>> round(field.in_unit("lm").total_flux / field.total_flux)
         683
         """
-        if unit not in FLUX_UNITS:
-            raise UnknownNameError("flux unit", unit, FLUX_UNITS)
+        require_known(unit, FLUX_UNITS, "flux unit")
         if unit == self.flux_unit:
             return self
         if self.spectrum is None:
@@ -262,7 +262,8 @@ def core_part(chart: _core._Part, part: PartField) -> _core._FieldPart:
 
 
 def _lines(points: npt.ArrayLike, directions: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    x, k = (np.ascontiguousarray(np.atleast_2d(v), dtype=np.float64) for v in (points, directions))
+    given = (("points", points), ("directions", directions))
+    x, k = (np.ascontiguousarray(np.atleast_2d(as_numbers(v, name, "rows of (n, 3)"))) for name, v in given)
     if x.shape != k.shape or x.shape[-1] != 3 or x.ndim != 2:
         raise ArgumentError(f"points of shape {x.shape} and directions of shape {k.shape}; give both as (n, 3).")
     if not (np.isfinite(x).all() and np.isfinite(k).all() and (np.abs(k).max(axis=1, initial=0) > 0).all()):

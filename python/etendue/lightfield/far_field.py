@@ -11,7 +11,7 @@ from etendue.lightfield.etendue_density import EtendueDensity
 from etendue.lightfield.field_rays import FieldRays
 from etendue.lightfield.symmetry import order
 from etendue.quantities.intensity import Intensity
-from etendue.quantities.intensity_nodes import Array, Nodes, planes_of
+from etendue.quantities.intensity_nodes import Array, Nodes, check_steps, planes_of
 from etendue.quantities.node_choice import choose_nodes
 from etendue.quantities.ray_stream import checked_threads
 from etendue.units import INTENSITY_UNIT
@@ -49,6 +49,7 @@ def field_intensity(
     >>> field_intensity(field, 4, 30.0, None).values.shape
     (4, 7)
     """
+    check_steps(c_planes, gamma_step)
     if (c_planes or 1) > MOST_PLANES or (gamma_step or 90.0) < FINEST:
         raise ArgumentError(
             f"c_planes is {c_planes} and gamma_step {gamma_step}°; of a light field, up to {MOST_PLANES:,} planes and "

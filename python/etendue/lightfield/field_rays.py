@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import operator
 from typing import Any
 
 from etendue import _core
-from etendue.errors import ArgumentError
 from etendue.lightfield.etendue_density import EtendueDensity
+from etendue.quantities.arguments import as_whole
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
-from etendue.quantities.ray_stream import DrawnRays, FloatArray, Progress, RayBatch
+from etendue.quantities.ray_stream import DrawnRays, FloatArray, Progress, RayBatch, checked_seed
 from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
 from etendue.units import FluxUnit
@@ -35,9 +34,7 @@ class FieldRays(DrawnRays):
     Raises
     ------
     ArgumentError
-        If a parameter is out of its domain.
-    TypeError
-        If the number of rays or the seed is no integer.
+        If the number of rays or the seed is no whole number, or out of its domain.
 
     Examples
     --------
@@ -50,12 +47,7 @@ class FieldRays(DrawnRays):
     """
 
     def __init__(self, field: EtendueDensity, rays: int, seed: int = 1) -> None:
-        # Python's own TypeError for 1e6, as everywhere a number of rays is asked for.
-        rays, seed = map(operator.index, (rays, seed))
-        if not 1 <= rays < 2**63:
-            raise ArgumentError(f"FieldRays: {rays} rays; give at least one, and fewer than 2^63.")
-        if not 0 <= seed < 2**64:
-            raise ArgumentError(f"FieldRays: seed {seed}; give 0 to 2^64 - 1.")
+        rays, seed = as_whole(rays, "FieldRays: the number of rays", 1, (1 << 63) - 1), checked_seed(seed)
         self.field = field
         self.seed = seed
         self._core = _core.FieldRays(field.core, rays, seed)

@@ -27,7 +27,7 @@ from etendue.lightfield.candidate import (
 )
 from etendue.lightfield.carrier import Plane, Surface
 from etendue.lightfield.close_lines import TOLD, blurred_share, crowding, told_of_blur
-from etendue.lightfield.counting import Depths, EtendueCounts, FloatArray, PartGrids, count_rays
+from etendue.lightfield.counting import DEEPEST, Depths, EtendueCounts, FloatArray, PartGrids, count_rays
 from etendue.lightfield.etendue_density import EtendueDensity, FitReport
 from etendue.lightfield.expected_loss import loss_of_gamma
 from etendue.lightfield.fit_progress import FitProgress, Step
@@ -35,9 +35,17 @@ from etendue.lightfield.focusing import focused
 from etendue.lightfield.narrow_beams import told_of_narrow_beams
 from etendue.lightfield.pilot_sample import check_near_field, lit_rays, pilot_sample
 from etendue.lightfield.selection.search import choose_surface
-from etendue.lightfield.symmetry import fold, order, proven_symmetry, refutation
+from etendue.lightfield.symmetry import SYMMETRIES, fold, order, proven_symmetry, refutation
 from etendue.lightfield.trees import POSITIONS, holding_memory
-from etendue.quantities.arguments import SURFACE, require, require_callable, require_number
+from etendue.quantities.arguments import (
+    SURFACE,
+    as_numbers,
+    as_whole,
+    require,
+    require_callable,
+    require_known,
+    require_number,
+)
 from etendue.quantities.distinct_rays import DistinctRays
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import Progress, RayStream, checked_seed, checked_threads
@@ -124,6 +132,8 @@ def fit_light_field(
         require_number(max_resolution, "max_resolution", "the side of the finest cells in mm, or None")
     if max_resolution is not None and not 0.0 < max_resolution < math.inf:
         raise ArgumentError(f"max_resolution is {max_resolution}; give the side of the finest cells, a length in mm.")
+    require_known(symmetry, (*SYMMETRIES, "none", "auto"), "symmetry")
+    depths = None if depths is None else _checked_depths(depths)
     require_callable(progress)
     require(surface, (str, Surface), "LightField.fit: surface", f"'auto', or {SURFACE}")
     check_near_field(rays)
@@ -162,6 +172,16 @@ def fit_light_field(
     told.end()
     notes = (*notes, *field.notes, *told_of_blur(field.surface, crowded), *repeated, *notes_of_rays(given))
     return field.replace(notes=notes, spectrum=spectrum)
+
+
+def _checked_depths(given: Depths) -> Depths:
+    """Four whole numbers, as a tuple of Python's own."""
+    what, wanted = "LightField.fit: depths", f"four whole numbers from 0 to {DEEPEST}, or None"
+    shape = as_numbers(given, what, wanted).shape
+    if shape != (4,):
+        raise ArgumentError(f"{what} has shape {shape}; give {wanted}.")
+    s1, s2, a, b = (as_whole(one, f"{what}: one of them", 0, DEEPEST) for one in given)
+    return s1, s2, a, b
 
 
 def _fit_on(

@@ -207,7 +207,7 @@ class LightField(EtendueDensity, InNotebook):
         OSError
             If the file cannot be written.
         """
-        save_field(self, Path(path))
+        save_field(self, as_path(path))
 
     @staticmethod
     def load(path: str | Path) -> LightField:

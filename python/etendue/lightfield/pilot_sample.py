@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import require
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream, squares_hold
 
@@ -55,6 +56,7 @@ def pilot_sample(rays: RayStream, at_most: int) -> RaySet:
     >>> len(pilot_sample(et.RingSource(rays=100_000), 16_384)), len(pilot_sample(et.RingSource(rays=1000), 16_384))
     (16384, 1000)
     """
+    require(rays, RayStream, "rays", "rays, of a file et.read_rays(path)")
     if not rays.has_position:
         raise ArgumentError("these rays have no positions (a far-field set), so no surface can carry them.")
     if isinstance(rays, RaySet) and len(rays) <= at_most and rays in _SAMPLES:

@@ -16,7 +16,7 @@ from etendue.lightfield.marginals import marginals
 from etendue.lightfield.nodes import node_values
 from etendue.lightfield.symmetry import sum_of_images
 from etendue.quantities.powers_of_ten import rounded
-from etendue.quantities.ray_stream import checked_threads
+from etendue.quantities.ray_stream import checked_seed, checked_threads
 
 PITCHES = tuple(2.13 * 2.0 ** (k / 2.0) for k in range(13))
 """Pitches of the arrays that are tried, in cells of the images along the longer side: none that dyadic boxes favour."""
@@ -124,7 +124,7 @@ def resolution(field: EtendueDensity, *, seed: int = 1, threads: int | None = No
     >>> resolution(many).place < resolution(few).place
     True
     """
-    threads = checked_threads(threads)
+    threads, seed = checked_threads(threads), checked_seed(seed)
     charts, fluxes = field.surface.parts(), field.part_flux
     index = int(np.argmax(fluxes))
     chart, part, report = charts[index], field.parts[index], field.report

@@ -8,8 +8,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.lightfield.counting import EtendueCounts, FloatArray, PartCounts, Sums
+from etendue.quantities.arguments import require_known
 
 Image = Callable[[FloatArray], FloatArray]
 
@@ -191,8 +192,7 @@ def _refuted(found: list[_Disagreement]) -> bool:
 
 
 def _images(counts: EtendueCounts, symmetry: str) -> tuple[Image, ...]:
-    if symmetry not in SYMMETRIES:
-        raise UnknownNameError("symmetry", symmetry, (*SYMMETRIES, "none", "auto"))
+    require_known(symmetry, SYMMETRIES, "symmetry")
     charts = counts.surface.parts()
     upright = all(abs(chart.axes[2][2]) == 1.0 for chart in charts)
     if not upright or any(chart.shape not in FLAT for chart in charts):

@@ -10,9 +10,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.luminance.regions import AnyRegion, Mask, check_region
-from etendue.quantities.arguments import require_number
+from etendue.quantities.arguments import require_known, require_number
 from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map
 from etendue.quantities.powers_of_ten import rounded
 from etendue.quantities.printable import printable
@@ -245,8 +245,7 @@ def compare(
     >>> result.difference.round(2).tolist()
     [[66.67, 0.0, 33.33, 66.67]]
     """
-    if dead not in DEAD_RULES:
-        raise UnknownNameError("rule for dead pixels", dead, DEAD_RULES)
+    require_known(dead, DEAD_RULES, "rule for dead pixels")
     for lmap in (test, reference):
         check_luminance_map(lmap, "compare")
     _check_comparable(test, reference, ignore_geometry)

@@ -204,7 +204,7 @@ def luminance_map(
     options = {
         "acceptance": acceptance,
         "observer_radius": observer_radius,
-        "surface": None if surface == "auto" else surface,
+        "surface": None if isinstance(surface, str) and surface == "auto" else surface,
         "samples": samples,
         "rays_per_pixel": rays_per_pixel,
         "until": until,

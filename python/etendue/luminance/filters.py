@@ -11,7 +11,8 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
+from etendue.quantities.arguments import require_known
 from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map, notes_that_stay
 from etendue.quantities.powers_of_ten import counted, rounded
 
@@ -124,8 +125,7 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     check_luminance_map(lmap, "filter_map")
     if kind == "opt":
         raise ArgumentError("filter_map: 'opt' is the denoiser, which needs no setting; call et.denoise_map(lmap).")
-    if not isinstance(kind, str) or kind not in FILTERS:
-        raise UnknownNameError("filter", kind, FILTERS)
+    require_known(kind, FILTERS, "filter")
     chosen = FILTERS[kind]
     rows, columns = _kernel_size(size)
     if chosen.selective and not (math.isfinite(gamma) and gamma > 0.0):
@@ -185,8 +185,7 @@ def kernel(kind: str, size: int | tuple[int, int] = 5) -> Array:
     >>> (100 * kernel("weighted", 5)).round(9).astype(int).tolist()
     [[1, 2, 4, 2, 1], [2, 4, 8, 4, 2], [4, 8, 16, 8, 4], [2, 4, 8, 4, 2], [1, 2, 4, 2, 1]]
     """
-    if kind not in FILTERS:
-        raise UnknownNameError("filter", kind, FILTERS)
+    require_known(kind, FILTERS, "filter")
     rows, columns = _kernel_size(size)
     weights: Array = np.outer(_weights(rows, FILTERS[kind].weighted), _weights(columns, FILTERS[kind].weighted))
     return weights / float(weights.sum())

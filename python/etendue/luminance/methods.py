@@ -93,7 +93,8 @@ class Cone(Method):
     def __post_init__(self) -> None:
         radius: Any = self.observer_radius
         angle: Any = self.acceptance
-        if angle is not None and not (angle == "auto" or (is_number(angle) and 0.0 < float(angle) <= 90.0)):
+        known = isinstance(angle, str) and angle == "auto"
+        if angle is not None and not (known or (is_number(angle) and 0.0 < float(angle) <= 90.0)):
             shown = f"{angle}°" if is_number(angle) else repr(angle)
             raise ArgumentError(f"acceptance is {shown}; give a half-angle above 0° and at most 90°, or 'auto'.")
         if radius is None:
@@ -150,7 +151,7 @@ class FromField(Method):
 
     def __post_init__(self) -> None:
         surface: Any = self.surface
-        if not (surface == "auto" or isinstance(surface, Surface)):
+        if not (isinstance(surface, Surface) or (isinstance(surface, str) and surface == "auto")):
             raise ArgumentError(f"surface is {surface!r}; give a Surface, or 'auto'. For text there is parse_surface.")
         samples: Any = self.samples
         if isinstance(samples, bool) or not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.luminance.comparison import DEAD_RULES, DeadRule
 from etendue.luminance.regions import ON_THE_EDGE, AnyRegion, check_region
-from etendue.quantities.arguments import LUMINANCE_OR_ILLUMINANCE, require, require_number
+from etendue.quantities.arguments import LUMINANCE_OR_ILLUMINANCE, require, require_known, require_number
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Screen
@@ -134,8 +134,7 @@ def region_statistics(
     percentiles = _percentiles(percentiles)
     if not all(0.0 <= share <= 100.0 for share in percentiles):
         raise ArgumentError(f"region_statistics: percentiles are {tuple(percentiles)}; give numbers from 0 to 100.")
-    if dead not in DEAD_RULES:
-        raise UnknownNameError("rule for dead pixels", dead, DEAD_RULES)
+    require_known(dead, DEAD_RULES, "rule for dead pixels")
     inside = region.mask(lmap.screen)
     live = inside & ~np.isnan(lmap.values)
     # A cell of illuminance that no ray reached is 0, of unknown error: it counts as a dead pixel does.

@@ -74,6 +74,7 @@ class Region:
         ArgumentError
             If no pixel centre lies in the region.
         """
+        require(screen, Screen, "Region: screen", "a Screen: et.Screen(width, height, columns, rows)")
         slack_x = ON_THE_EDGE * screen.width / screen.columns
         slack_y = ON_THE_EDGE * screen.height / screen.rows
         columns = (screen.x >= self.left - slack_x) & (screen.x <= self.right + slack_x)
@@ -146,6 +147,7 @@ class PolygonRegion:
         ArgumentError
             If no pixel centre lies in the region.
         """
+        require(screen, Screen, "PolygonRegion: screen", "a Screen: et.Screen(width, height, columns, rows)")
         x, y = screen.x[None, :], screen.y[:, None]
         inside, on_edge = np.zeros(screen.shape, dtype=np.bool_), np.zeros(screen.shape, dtype=np.bool_)
         slack = ON_THE_EDGE * min(screen.width / screen.columns, screen.height / screen.rows)

@@ -14,7 +14,7 @@ from etendue.plot import style
 from etendue.plot.animation_files import COLOURS, Frame, Writing, writer_for
 from etendue.plot.colour_scale import Scale, choose_scale, colour_map, normalisation
 from etendue.plot.map_picture import MapLayout, axis_names, draw_colour_bar, draw_screen
-from etendue.quantities.arguments import require, require_number
+from etendue.quantities.arguments import require, require_number, require_path
 from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def plot_animation(
     require(maps, (list, tuple), "plot_animation: maps", "a list of two LuminanceMaps or more")
     for lmap in maps:
         check_luminance_map(lmap, "plot_animation")
-    require(path, (str, os.PathLike), "plot_animation: path", "the path of a moving picture, .gif, .html or .mp4")
+    require_path(path, "plot_animation: path", "the path of a moving picture, .gif, .html or .mp4")
     for name, end in (("vmin", vmin), ("vmax", vmax)):
         if end is not None:
             require_number(end, f"plot_animation: {name}", "a luminance, or None")

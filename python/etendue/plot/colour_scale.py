@@ -12,6 +12,7 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.extras import require
 from etendue.plot import style
 from etendue.quantities.arguments import require as require_kind
+from etendue.quantities.arguments import require_known
 
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap, Normalize
@@ -64,8 +65,7 @@ def choose_scale(values: Array, wanted: str, quantity: str = "pixel") -> ChosenS
     >>> choose_scale(np.array([0.0, 100.0, 200.0, 500.0]), "auto").name
     'linear'
     """
-    if wanted not in SCALES:
-        raise UnknownNameError("colour scale", wanted, SCALES)
+    require_known(wanted, SCALES, "colour scale")
     if wanted != "auto":
         return ChosenScale("log" if wanted == "log" else "linear", "")
     lit = values[np.isfinite(values) & (values > 0.0)]

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args, overload
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.luminance.comparison import Comparison
 from etendue.plot import style
 from etendue.plot.colour_scale import Scale, choose_scale, colour_map, normalisation, signed_normalisation
 from etendue.plot.map_picture import NARROWEST, axis_names, bar_beside, draw_colour_bar, draw_screen, picture_within
 from etendue.plot.region_marks import draw_outline
-from etendue.quantities.arguments import require
+from etendue.quantities.arguments import require, require_known
 from etendue.quantities.observer import Screen
 
 if TYPE_CHECKING:
@@ -127,8 +127,7 @@ def plot_comparison(
     ['test', 'reference', 'test − reference']
     """
     require(comparison, Comparison, "plot_comparison: comparison", "what et.compare(test, reference) gives")
-    if difference not in DIFFERENCES:
-        raise UnknownNameError("difference", difference, DIFFERENCES)
+    require_known(difference, DIFFERENCES, "difference")
     reference = comparison.reference
     chosen = choose_scale(np.stack((comparison.test.values, reference.values)), scale)
     require(labels, (tuple, list), "plot_comparison: labels", "two names, as ('test', 'reference')")

@@ -203,6 +203,8 @@ def _check(sections: Sequence[CrossSection], labels: Sequence[str] | None) -> No
         raise ArgumentError(f"plot_cross_sections: cannot share axes: {'; '.join(kinds)}. Draw them one by one.")
     if labels is not None:
         require(labels, (tuple, list), "plot_cross_sections: labels", "a list with a name for each section, or None")
+        for label in labels:
+            require(label, str, "plot_cross_sections: one of the labels", "a name, or None instead of all labels")
     if labels is not None and len(labels) != len(sections):
         raise ArgumentError(
             f"plot_cross_sections: {len(labels)} labels for {len(sections)} sections; give one for each."

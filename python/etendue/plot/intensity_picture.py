@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, get_args, overload
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.plot import style
-from etendue.quantities.arguments import INTENSITY, require
+from etendue.quantities.arguments import INTENSITY, require, require_known
 from etendue.quantities.data_sheet import DataSheet, data_sheet
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.measured import measured, measured_peak
@@ -124,8 +124,7 @@ def plot_intensity(
     >>> [line.get_label() for line in plot_intensity(lambertian, kind="cartesian").axes[0].lines]
     ['all C']
     """
-    if kind not in INTENSITY_KINDS:
-        raise UnknownNameError("kind of diagram", kind, INTENSITY_KINDS)
+    require_known(kind, INTENSITY_KINDS, "kind of diagram")
     require(intensity, Intensity, "plot_intensity: intensity", INTENSITY)
     sheet = data_sheet(intensity)
     unit, factor = intensity.unit, 1.0

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, get_args, overload
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import UnknownNameError
 from etendue.luminance.regions import AnyRegion, check_region
 from etendue.plot import style
 from etendue.plot.colour_scale import Scale, choose_scale, colour_map, normalisation
 from etendue.plot.region_marks import draw_marks, marks_of
-from etendue.quantities.arguments import LUMINANCE_OR_ILLUMINANCE, require, require_number
+from etendue.quantities.arguments import LUMINANCE_OR_ILLUMINANCE, require, require_known, require_number
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Screen
@@ -137,8 +136,7 @@ def plot_map(
     >>> plot_map(lmap, scale="log").axes[0].get_xlabel()
     'horizontal on the screen [mm]'
     """
-    if show not in SHOWS:
-        raise UnknownNameError("thing to show", show, SHOWS)
+    require_known(show, SHOWS, "thing to show")
     require(lmap, (LuminanceMap, IlluminanceMap), "plot_map: lmap", LUMINANCE_OR_ILLUMINANCE)
     for name, end in (("vmin", vmin), ("vmax", vmax)):
         if end is not None:

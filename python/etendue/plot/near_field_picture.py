@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from etendue.errors import ArgumentError
 from etendue.instruments.near_field.run import NearFieldRun
 from etendue.plot import style
 from etendue.plot.colour_scale import colour_map
@@ -84,6 +86,8 @@ def plot_near_field(
     """
     require(run, NearFieldRun, "plot_near_field: run", "what et.NearFieldGoniophotometer().measure(lamp) gives")
     require_number(c, "plot_near_field: c", "an angle in °")
+    if not math.isfinite(c):
+        raise ArgumentError(f"plot_near_field: c is {c:g}; give an angle in °.")
     maps = [run.luminance_map(gamma, c) for gamma in _positions(run, c)]
     if ax is not None:
         panels = style.given_axes(ax, len(maps), path)

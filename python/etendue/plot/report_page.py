@@ -20,7 +20,7 @@ from etendue.plot import style
 from etendue.plot.colour_scale import choose_scale, colour_map, normalisation
 from etendue.plot.intensity_picture import plot_intensity
 from etendue.plot.map_picture import axis_names, draw_colour_bar, draw_screen, plot_map
-from etendue.quantities.arguments import require
+from etendue.quantities.arguments import require, require_path
 from etendue.quantities.measured import measured
 from etendue.quantities.observer import Observer
 from etendue.quantities.printable import printable
@@ -91,7 +91,7 @@ def plot_report(report: SourceReport, path: str | os.PathLike[str] | None = None
     """
     require(report, SourceReport, "plot_report: report", "what et.report_source(rays) gives")
     if path is not None:
-        require(path, (str, os.PathLike), "plot_report: path", "the path of the page, or None")
+        require_path(path, "plot_report: path", "the path of the page, or None")
     suffix = None if path is None else Path(path).suffix.lower()
     if suffix is not None and suffix not in PAGE_TYPES:
         raise UnknownNameError("extension of a report", suffix, PAGE_TYPES)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.extras import require
 from etendue.formats.output import atomic_output
-from etendue.quantities.arguments import require as require_kind
+from etendue.quantities.arguments import require_path
 from etendue.quantities.observer import Observer
 from etendue.quantities.powers_of_ten import common_power, ten_to
 from etendue.quantities.printable import printable
@@ -160,7 +160,7 @@ def finish(figure: Figure, path: str | os.PathLike[str] | None) -> Figure:
     """
     _take_texts_as_they_are(figure)
     if path is not None:
-        require_kind(path, (str, os.PathLike), "plot: path", "the path of the picture, .png, .svg or .pdf")
+        require_path(path, "plot: path", "the path of the picture, .png, .svg or .pdf")
         suffix = Path(path).suffix.lower()
         if suffix not in FILE_TYPES:
             raise UnknownNameError("extension of a picture", suffix, FILE_TYPES)

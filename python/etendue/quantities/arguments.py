@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Mapping
+import os
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
-from etendue.errors import ArgumentError
+from etendue.errors import ArgumentError, UnknownNameError
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -25,6 +26,14 @@ SCENE = "a Scene: of a file et.Scene.load(path)"
 
 SURFACE = "an et.Surface such as et.Disk(radius=30); of a text et.parse_surface(text)"
 """What to give where a carrier surface is wanted."""
+
+SCANS = "Scans: of files et.read_scans(paths)"
+"""What to give where scans of a goniometer are wanted."""
+
+BSDF = "a BSDF: a model such as et.bsdf.Lambertian(reflectance=0.8), or of a file et.read_bsdf(path)"
+"""What to give where a BSDF is wanted."""
+
+RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 MOST_LETTERS = 40
 """Of a text that is told."""
@@ -74,6 +83,61 @@ def require(given: object, kinds: type | tuple[type, ...], what: str, instead: s
         raise ArgumentError(f"{what} is {described(given)}; give {instead}.")
 
 
+def require_path(given: object, what: str = "path", instead: str = "the path of a file") -> None:
+    """Refuse what is no path.
+
+    Parameters
+    ----------
+    given : object
+        The argument; whether there is a file is not asked.
+    what, instead : str
+        As of `require`.
+
+    Raises
+    ------
+    ArgumentError
+        If so.
+
+    Examples
+    --------
+    >>> require_path("lamp.ies")
+    >>> require_path(None)
+    Traceback (most recent call last):
+    etendue.errors.ArgumentError: path is None; give the path of a file.
+    """
+    require(given, (str, os.PathLike), what, instead)
+    if "\0" in str(given):  # the system would read it as the end
+        raise ArgumentError(f"{what} is {described(str(given))}, and no path has a letter of code 0; give {instead}.")
+
+
+def require_known(given: object, known: Collection[str], what: str) -> None:
+    """Refuse a name that is none of these, also what Python could not compare with them, as lists and arrays.
+
+    Parameters
+    ----------
+    given : object
+        The argument.
+    known : collection of str
+        The names that there are.
+    what : str
+        They are names of.
+
+    Raises
+    ------
+    UnknownNameError
+        If it is something else.
+
+    Examples
+    --------
+    >>> require_known("ies", ("ies", "eulumdat"), "format")
+    >>> require_known(["ies"], ("ies", "eulumdat"), "format")
+    Traceback (most recent call last):
+    etendue.errors.UnknownNameError: unknown format ['ies']. Known: eulumdat, ies.
+    """
+    if not isinstance(given, str) or given not in known:
+        raise UnknownNameError(what, given, known)
+
+
 def require_number(given: Any, what: str, instead: str = "a number") -> None:
     """Refuse what is no real number: texts that look like one, None, arrays of several.
 
@@ -102,6 +166,38 @@ def require_number(given: Any, what: str, instead: str = "a number") -> None:
     scalar = getattr(given, "ndim", None) == 0 and getattr(getattr(given, "dtype", None), "kind", "") in "iuf"
     if not (isinstance(given, numbers.Real) or scalar):
         raise ArgumentError(f"{what} is {described(given)}; give {instead}.")
+
+
+def as_whole(given: Any, what: str, least: int = 0, most: int = (1 << 64) - 1) -> int:
+    """A whole number of a range, as Python's own; True and False are none.
+
+    Parameters
+    ----------
+    given : int
+        The argument; scalars of numpy are numbers.
+    what : str
+        Function and argument.
+    least, most : int
+        The range, both included; a large `most` is one less than a power of two.
+
+    Raises
+    ------
+    ArgumentError
+        If it is something else.
+
+    Examples
+    --------
+    >>> as_whole(3, "sample: n", 1)
+    3
+    >>> as_whole(3.0, "sample: n", 1, 100)
+    Traceback (most recent call last):
+    etendue.errors.ArgumentError: sample: n is 3.0; give a whole number from 1 to 100.
+    """
+    whole = isinstance(given, numbers.Integral) and not isinstance(given, bool)
+    if not (whole and least <= given <= most):
+        told = f"{most:,}" if most < 1 << 40 else "2" + str((most + 1).bit_length() - 1).translate(RAISED) + " − 1"
+        raise ArgumentError(f"{what} is {described(given)}; give a whole number from {least:,} to {told}.")
+    return int(given)
 
 
 def require_numbers(holder: object, *names: str, instead: str = "a number", none: bool = False) -> None:

@@ -10,9 +10,9 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.quantities.angle_table import gaps_of, kinks_along, kinks_around
-from etendue.quantities.arguments import INTENSITY, require, require_number
+from etendue.quantities.arguments import INTENSITY, require, require_known, require_number
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.intensity_nodes import NEIGHBOURS
 from etendue.quantities.node_errors import known_errors, shared_around
@@ -144,8 +144,7 @@ def beam_angle(
     require_number(c, "beam_angle: c", "the angle C of the plane in degrees")
     if not 0.0 < share < 1.0:
         raise ArgumentError(f"beam_angle: share is {share:g}; give a share of the intensity above 0 and below 1.")
-    if reference not in REFERENCES:
-        raise UnknownNameError("reference of a beam angle", reference, REFERENCES)
+    require_known(reference, REFERENCES, "reference of a beam angle")
     if not math.isfinite(c):
         raise ArgumentError(f"beam_angle: the plane is C = {c}; give an angle in degrees.")
     if about is not None:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.quantities.angle_table import ROUNDING, gaps_of, hat_integrals, kinks_along, kinks_around
-from etendue.quantities.arguments import as_numbers, require, require_number
+from etendue.quantities.arguments import as_numbers, require, require_known, require_number
 from etendue.quantities.labelled import dataset
 from etendue.quantities.luminaire_facts import LUMINAIRE_FACTS, mirrored_facts, turned_facts
 from etendue.quantities.notebook import InNotebook
@@ -102,12 +102,11 @@ class Intensity(InNotebook):
         return f"<Intensity of {size} up to {self.values.max():.4g} {self.unit} from {self.provenance.source}>"
 
     def __post_init__(self) -> None:
-        if self.flux_unit not in FLUX_UNITS:
-            raise UnknownNameError("flux unit", self.flux_unit, FLUX_UNITS)
+        require_known(self.flux_unit, FLUX_UNITS, "flux unit")
+        require(self.provenance, Provenance, "Intensity: provenance", "a Provenance, or leave it out")
         require(self.luminaire, Mapping, "Intensity: luminaire", "facts by their names, as {'name': 'lamp'}")
         for fact in self.luminaire:
-            if fact not in LUMINAIRE_FACTS:
-                raise UnknownNameError("fact about a luminaire", fact, LUMINAIRE_FACTS)
+            require_known(fact, LUMINAIRE_FACTS, "fact about a luminaire")
         for name in ("c", "gamma", "values", "standard_error"):
             array = as_numbers(getattr(self, name), f"Intensity: {name}", copy=True)
             if name == "standard_error" and array.ndim == 0:
@@ -414,7 +413,7 @@ class Intensity(InNotebook):
             left to the nearest multiple stands in ``luminaire["extents_turned"]``, unless all that is known is round.
         """
         require_number(angle, "Intensity: the angle to turn by", "a number of degrees")
-        if not np.isfinite(angle):
+        if not np.isfinite(angle := float(angle)):
             raise ArgumentError(f"Intensity: cannot be turned by {angle}°.")
         step = f"{TURNED} {angle:.9g}° about the axis"
         return self._with_planes_at(self.c + angle, step, turned_facts(self.luminaire, angle))

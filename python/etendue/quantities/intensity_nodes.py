@@ -14,7 +14,7 @@ import numpy.typing as npt
 from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.quantities.angle_table import gaps_of, hat_integrals
-from etendue.quantities.arguments import require_number
+from etendue.quantities.arguments import as_whole, require_number
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.provenance import Provenance
 from etendue.units import FluxUnit
@@ -87,6 +87,8 @@ class Nodes:
         ArgumentError
             If there are no such planes or steps, or too many nodes.
         """
+        as_whole(c_planes, "c_planes", 1, MOST_CELLS)
+        require_number(gamma_step, "gamma_step", "an angle above 0° and up to 90°")
         check_steps(c_planes, gamma_step)
         gamma = tuple(np.linspace(0.0, 180.0, round(180.0 / gamma_step) + 1).tolist())
         plane = planes_of(c_planes)
@@ -254,8 +256,8 @@ def check_steps(c_planes: int | None, gamma_step: float | None) -> None:
     >>> check_steps(36, 2.5), check_steps(None, None)
     (None, None)
     """
-    if c_planes is not None and not (isinstance(c_planes, int) and c_planes >= 1):
-        raise ArgumentError(f"c_planes is {c_planes!r}; give a whole number of planes, 1 or more.")
+    if c_planes is not None:
+        as_whole(c_planes, "c_planes", 1, MOST_CELLS)
     if gamma_step is None:
         steps = 0
     else:

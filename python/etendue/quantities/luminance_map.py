@@ -66,6 +66,10 @@ class LuminanceMap(PixelMap):
     UNITS: ClassVar = LUMINANCE_UNIT
     QUANTITIES: ClassVar = LUMINANCE_NAME
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require(self.observer, Observer, "LuminanceMap: observer", "an Observer: et.Observer(theta, phi, distance)")
+
     @property
     def dead_pixels(self) -> int:
         """Number of pixels that no ray reached (NaN in `values`)."""

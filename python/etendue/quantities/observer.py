@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue import _core
-from etendue.errors import ArgumentError, UnknownNameError
-from etendue.quantities.arguments import as_point, require_numbers
+from etendue.errors import ArgumentError
+from etendue.quantities.arguments import as_point, require, require_known, require_numbers
 
 Plane = Literal["view", "xy"]
 PLANES: tuple[Plane, ...] = get_args(Plane)
@@ -212,8 +212,7 @@ class Screen:
             raise ArgumentError(
                 f"Screen: {self.columns} × {self.rows} pixels are too many for any memory; give {MAX_PIXELS:,} at most."
             )
-        if self.plane not in PLANES:
-            raise UnknownNameError("screen plane", self.plane, PLANES)
+        require_known(self.plane, PLANES, "screen plane")
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -244,6 +243,7 @@ class Screen:
             If ``plane="xy"`` and the observer stands in that plane (θ = 90°): every pixel's apparent area is zero; or he has
             `up` or `roll`, which turn no fixed plane.
         """
+        require(observer, Observer, "Screen: observer", "an Observer: et.Observer(theta, phi, distance)")
         if self.plane == "view":
             return observer.axes()
         if observer.up is not None or observer.roll != 0.0:

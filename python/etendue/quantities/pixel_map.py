@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
-from etendue.quantities.arguments import as_numbers, require
+from etendue.errors import ArgumentError
+from etendue.quantities.arguments import as_numbers, require, require_known, require_path
 from etendue.quantities.labelled import dataset
 from etendue.quantities.notebook import InNotebook
 from etendue.quantities.observer import Screen
@@ -73,9 +73,9 @@ class PixelMap(InNotebook, GoesOut, abc.ABC):
         return f"<{type(self).__name__} of {size} up to {brightest:.4g} {self.unit} from {self.provenance.source}>"
 
     def __post_init__(self) -> None:
-        if self.flux_unit not in FLUX_UNITS:
-            raise UnknownNameError("flux unit", self.flux_unit, FLUX_UNITS)
+        require_known(self.flux_unit, FLUX_UNITS, "flux unit")
         kind = type(self).__name__
+        require(self.provenance, Provenance, f"{kind}: provenance", "a Provenance, or leave it out")
         require(self.screen, Screen, f"{kind}: screen", "an et.Screen(width, height, columns, rows)")
         for name, dtype in (("values", np.float64), ("standard_error", np.float64), ("rays", np.int64)):
             with np.errstate(invalid="ignore"):  # signalling NaN of damaged files
@@ -111,6 +111,7 @@ class PixelMap(InNotebook, GoesOut, abc.ABC):
         tuple of str
             What the format could not express, one sentence each; empty when it holds everything.
         """
+        require_path(path)
         return self.outlets.save(self, Path(path))
 
     def plot(self, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from etendue import _core
-from etendue.errors import ArgumentError, UnitError, UnknownNameError
-from etendue.quantities.arguments import require, require_number
+from etendue.errors import ArgumentError, UnitError
+from etendue.quantities.arguments import as_numbers, require, require_known, require_number
 from etendue.quantities.ray_records import FLUX_COLUMNS, RayRecords
 from etendue.quantities.ray_rewriting import CHUNK, Rays, Records, transformed, with_records, without
 from etendue.quantities.ray_stream import FloatArray
@@ -95,9 +95,8 @@ def with_total_flux(rays: Rays, flux: float, unit: FluxUnit | None = None) -> Ra
     require_number(flux, "total flux", "a finite flux > 0")
     if not (math.isfinite(flux) and flux > 0):
         raise ArgumentError(f"total flux {flux}; give a finite flux > 0.")
-    unit = unit or rays.flux_unit
-    if unit not in FLUX_UNITS:
-        raise UnknownNameError("flux unit", unit, FLUX_UNITS)
+    unit = rays.flux_unit if unit is None else unit
+    require_known(unit, FLUX_UNITS, "flux unit")
     if unit != rays.flux_unit and knows_spectrum(rays):
         # Lumens of rays that the eye does not see cannot become watts; then the statement below is all there is.
         with contextlib.suppress(UnitError):
@@ -150,6 +149,7 @@ def rotated(rays: Rays, axis: Sequence[float], angle: float) -> Rays:
     norm = float(np.linalg.norm(a))
     if norm == 0:
         raise ArgumentError("rotated: the axis has no length.")
+    require_number(angle, "rotated: angle", "a number of degrees")
     if not math.isfinite(angle):
         raise ArgumentError(f"rotated: angle is {angle}°.")
     a = a / norm
@@ -180,6 +180,7 @@ def propagated_to_plane(rays: Rays, point: Sequence[float], normal: Sequence[flo
 def propagated_to_sphere(rays: Rays, centre: Sequence[float], radius: float) -> Rays:
     """Start points moved along the rays, forwards or backwards, to where they leave a sphere [mm]."""
     c = _vector(centre, "centre")
+    require_number(radius, "propagated_to_sphere: radius", "a finite radius > 0 in mm")
     if not (math.isfinite(radius) and radius > 0):
         raise ArgumentError(f"propagated_to_sphere: radius is {radius} mm; give a finite radius > 0.")
 
@@ -217,7 +218,7 @@ def _check_seed(seed: int) -> None:
 
 
 def _vector(value: Sequence[float], name: str) -> FloatArray:
-    vector = np.asarray(value, dtype=np.float64)
+    vector = as_numbers(value, name, "three finite components")
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise ArgumentError(f"{name} is {value}; give three finite components.")
     return vector

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.arguments import require, require_known
 from etendue.quantities.file_records import AnyRecords, FileRecords
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import FloatArray, Progress, RayStream, Tally, checked_threads
@@ -133,8 +134,8 @@ class RayRecords(RayStream):
 
     def _adopt(self, records: AnyRecords, meaning: RaySetMeaning) -> None:
         fields: Mapping[str, Any] = records.dtype.fields or {}
-        if meaning.flux_unit not in FLUX_UNITS:
-            raise UnknownNameError("flux unit", meaning.flux_unit, FLUX_UNITS)
+        require_known(meaning.flux_unit, FLUX_UNITS, "flux unit")
+        require(meaning.provenance, Provenance, "RaySet: provenance", "a Provenance, or leave it out")
         for name in fields:
             if name not in GEOMETRY_COLUMNS and name not in EXTRA_COLUMNS:
                 raise UnknownNameError("ray column", name, (*GEOMETRY_COLUMNS, *EXTRA_COLUMNS))
@@ -258,8 +259,7 @@ class RayRecords(RayStream):
         UnknownNameError
             If the set has no such column.
         """
-        if name not in self.columns:
-            raise UnknownNameError("ray column", name, self.columns)
+        require_known(name, self.columns, "ray column")
         if name == "spectrum_index":
             return self._field(name, rows).astype(np.int64)
         if name == "wavelength":

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import as_whole, require_callable
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
@@ -209,6 +210,7 @@ class RayStream(abc.ABC):
 
     def pass_over(self, progress: Progress | None = None, threads: int | None = None) -> Tally:
         """One pass over all rays for the flux account."""
+        require_callable(progress)
         tally, _ = _core.scan(self.core_source(), checked_threads(threads), progress)
         result = Tally.from_core(tally)
         self.accept_tally(result)
@@ -231,6 +233,7 @@ class RayStream(abc.ABC):
         >>> [len(b.flux) for b in et.RingSource(rays=10).watched(seen.append).batches(size=4)], seen
         ([4, 4, 2], [4, 8, 10])
         """
+        require_callable(progress)
         same = copy.copy(self)
         same._watcher = progress  # noqa: SLF001 - its own kind
         return same
@@ -249,6 +252,7 @@ class RayStream(abc.ABC):
         >>> [len(b.flux) for b in et.RingSource(rays=10).batches(size=4)]
         [4, 4, 2]
         """
+        size = as_whole(size, "batches: size", 1)
         source, scale = self.core_source(), self.flux_scale
         for start in range(0, len(self), size):
             stop = min(start + size, len(self))

@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from etendue.errors import UnitError, UnknownNameError
+from etendue.errors import UnitError
+from etendue.quantities.arguments import require_known
 from etendue.quantities.ray_records import RayRecords
 from etendue.quantities.ray_rewriting import Rays, column_of, with_flux, without
 from etendue.quantities.ray_stream import FloatArray, RayBatch
@@ -16,8 +17,7 @@ from etendue.units import FLUX_UNITS, LUMINOUS_EFFICACY_MAX, FluxUnit
 
 def in_unit(rays: Rays, unit: FluxUnit) -> Rays:
     """The set with its flux in lumens or watts, through its spectrum: Φ_v = K_m ∫ Φ_e,λ V(λ) dλ."""
-    if unit not in FLUX_UNITS:
-        raise UnknownNameError("flux unit", unit, FLUX_UNITS)
+    require_known(unit, FLUX_UNITS, "flux unit")
     if unit == rays.flux_unit:
         return rays
     # A radiant-flux column beside a luminous one is the better truth: it is used before any spectrum.

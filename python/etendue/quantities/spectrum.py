@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.quantities.arguments import as_numbers
-from etendue.units import LUMINOUS_EFFICACY_MAX, FluxUnit
+from etendue.quantities.arguments import as_numbers, require_known
+from etendue.units import FLUX_UNITS, LUMINOUS_EFFICACY_MAX, FluxUnit
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -110,6 +110,7 @@ class Spectrum:
         >>> wavelength.size, round(float(wavelength @ shares))
         (201, 559)
         """
+        require_known(flux_unit, FLUX_UNITS, "flux unit")
         wavelength = self._refined()
         weight = np.interp(wavelength, self.wavelength, self.weight)
         if wavelength.size > 1:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import abc
 import functools
 import math
-import numbers
 from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
@@ -18,7 +17,8 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.description.files import Files
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
+from etendue.quantities.arguments import as_numbers, as_whole, require_known, require_number
 from etendue.quantities.bsdf_directions import direction
 from etendue.quantities.vectors import lengths
 from etendue.scatter.building import built
@@ -32,9 +32,6 @@ UNIT = 1e-6
 
 WAVELENGTH = 555.0
 """[nm], where nothing else is said."""
-
-MOST_SEED = 2**64 - 1
-"""Of the numbers that rays are drawn with."""
 
 
 def unit_vectors(name: str, values: npt.ArrayLike) -> Array:
@@ -50,7 +47,7 @@ def unit_vectors(name: str, values: npt.ArrayLike) -> Array:
     >>> unit_vectors("incident", [0, 0, 1]).tolist()
     [0.0, 0.0, 1.0]
     """
-    given = np.asarray(values, np.float64)
+    given = as_numbers(values, name, "unit vectors of shape (…, 3)")
     if given.ndim < 1 or given.shape[-1] != 3:
         raise ArgumentError(f"{name} has shape {given.shape}; unit vectors have shape (…, 3)")
     length = lengths(given)[..., None]
@@ -60,8 +57,7 @@ def unit_vectors(name: str, values: npt.ArrayLike) -> Array:
 
 
 def _known(side: Side) -> Side:
-    if side not in get_args(Side):
-        raise UnknownNameError("side", side, get_args(Side))
+    require_known(side, get_args(Side), "side")
     return side
 
 
@@ -212,10 +208,7 @@ class Bsdf(abc.ABC):
             2⁶⁴ − 1, or the wavelength or an index is not finite and above 0.
         """
         direction = unit_vectors("incident", incident)
-        counts: dict[str, Any] = {"n": n, "seed": seed}
-        for name, value in counts.items():
-            if not (isinstance(value, numbers.Integral) and 0 <= int(value) <= MOST_SEED):
-                raise ArgumentError(f"{name} is {value!r}; give a whole number from 0 to 2⁶⁴ − 1.")
+        n, seed = as_whole(n, "n"), as_whole(seed, "seed")
         surroundings = _surroundings(wavelength, media)
         if direction.shape == (n, 3):
             return self._compiled.sample_each(direction, seed, surroundings)
@@ -309,12 +302,12 @@ class Bsdf(abc.ABC):
         self, theta: npt.ArrayLike, phi: npt.ArrayLike, side: Side, media: tuple[float, float, float]
     ) -> tuple[Array, Array, Array, Array]:
         side = _known(side)
-        angles = np.asarray(theta, np.float64)
+        angles, azimuths = as_numbers(theta, "theta", "angles in °"), as_numbers(phi, "phi", "azimuths in °")
         if not ((angles >= 0.0) & (angles <= 90.0)).all():
             raise ArgumentError("angles of incidence are from 0 to 90°")
-        if not np.isfinite(np.asarray(phi, np.float64)).all():
+        if not np.isfinite(azimuths).all():
             raise ArgumentError(f"phi is {phi!r}; give finite azimuths [°].")
-        incident = direction(angles, phi, behind=side == "back")
+        incident = direction(angles, azimuths, behind=side == "back")
         found = self._compiled.shares(incident.reshape(-1, 3), media)
         a, b, c, d = (column.reshape(incident.shape[:-1]) for column in found.T)
         return a, b, c, d
@@ -386,13 +379,15 @@ class Bsdf(abc.ABC):
 
 def _surroundings(wavelength: float, media: tuple[float, float]) -> tuple[float, float, float]:
     """As the core takes them."""
+    require_number(wavelength, "wavelength", "a finite number of nm above 0")
     if not (math.isfinite(wavelength) and wavelength > 0.0):
         raise ArgumentError(f"wavelength is {wavelength!r}; give a finite number of nm above 0.")
-    if len(media) != 2 or not all(math.isfinite(index) and index > 0.0 for index in media):
-        raise ArgumentError(
-            f"media is {media!r}; give two refractive indices, finite and above 0: in front and behind."
-        )
-    return wavelength, *media
+    wanted = "two refractive indices, finite and above 0: in front and behind"
+    indices = as_numbers(media, "media", wanted)
+    if indices.shape != (2,) or not (np.isfinite(indices) & (indices > 0.0)).all():
+        raise ArgumentError(f"media is {media!r}; give {wanted}.")
+    front, behind = indices.tolist()
+    return float(wavelength), front, behind
 
 
 def _pairs(incident: npt.ArrayLike, scattered: npt.ArrayLike) -> tuple[tuple[int, ...], tuple[Array, Array]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from etendue.description.files import Files
 from etendue.errors import ArgumentError
 from etendue.formats.bsdf import bsdf_format, read_bsdf_data, write_bsdf_data, write_bsdf_shares
 from etendue.formats.bsdf.bsdf_format import NO_ERRORS, BsdfFormat
+from etendue.quantities.arguments import BSDF, require, require_path
 from etendue.quantities.bsdf_data import BsdfData
 from etendue.quantities.bsdf_directions import LEAN, NORMAL
 from etendue.quantities.report import Complaint
@@ -76,9 +77,14 @@ def read_bsdf(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -
     ...     read_bsdf(Path(folder) / "film.h5").reflectance(30).round(3).tolist()
     0.706
     """
-    paths = [path] if isinstance(path, str | os.PathLike) else list(path)
+    paths: list[Any] = [path]
+    if not isinstance(path, str | os.PathLike):
+        require(path, Iterable, "read_bsdf: path", "the path of a file, or a list of them")
+        paths = list(path)
+    for one in paths:
+        require_path(one, "read_bsdf: path" if one is path else "read_bsdf: one of the paths")
     if not paths:
-        raise ArgumentError("there is no file to read")
+        raise ArgumentError("read_bsdf: there is no file to read; give the path of one.")
     parts, names = [read_bsdf_data(one) for one in paths], [Path(one).name for one in paths]
     data = parts[0] if len(parts) == 1 else _joined(parts, names)
     try:
@@ -219,6 +225,8 @@ def write_bsdf(path: str | os.PathLike[str], bsdf: Bsdf, format: str | None = No
     ...     write_bsdf(Path(folder) / "polish.h5", ABg(a=0.0025, b=0.001, g=1.8))
     ()
     """
+    require_path(path, "write_bsdf: path", "the path of the file first, then the BSDF")
+    require(bsdf, Bsdf, "write_bsdf: bsdf", BSDF)
     form = bsdf_format(Path(path), format)
     if form.write_shares is not None:
         write_bsdf_shares(path, share_tables(bsdf, form), form.name)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import UnknownNameError
+from etendue.quantities.arguments import require_known
 from etendue.scatter.models import MODELS, CosinePower, Lambertian, Mirror, Mixture, Transmitter
 
 Array = npt.NDArray[np.float64]
@@ -176,6 +176,5 @@ def lobe_model(name: str) -> LobeModel:
     UnknownNameError
         If there is none.
     """
-    if name not in LOBE_MODELS:
-        raise UnknownNameError("model of a lobe", name, LOBE_MODELS)
+    require_known(name, LOBE_MODELS, "model of a lobe")
     return LOBE_MODELS[name]

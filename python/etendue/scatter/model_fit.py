@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, SceneError, UnknownNameError
+from etendue.errors import ArgumentError, SceneError
 from etendue.extras import scipy_part
+from etendue.quantities.arguments import SCANS, require, require_known
 from etendue.quantities.bsdf_data import BsdfData
 from etendue.quantities.measured import measured
 from etendue.scatter.error_law import ErrorLaw, error_law
@@ -240,8 +241,8 @@ def fit_bsdf(scans: Scans, model: str) -> BsdfFit:
     >>> {name: round(value, 4) for name, value in fit_bsdf(scans, "abg").parameters.items()}
     {'a': 0.02, 'b': 0.01, 'g': 1.8}
     """
-    if model not in FITTED_MODELS:
-        raise UnknownNameError("model to fit", model, FITTED_MODELS)
+    require_known(model, FITTED_MODELS, "model to fit")
+    require(scans, Scans, "fit_bsdf: scans", SCANS)
     if (scans.scattered[:, 2] < 0.0).any():
         at = int(np.argmax(scans.scattered[:, 2] < 0.0))
         raise ArgumentError(

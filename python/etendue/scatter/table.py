@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from etendue.description.files import Files
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import require
 from etendue.quantities.bsdf_data import BsdfData
 from etendue.quantities.bsdf_directions import NORMAL
 from etendue.quantities.bsdf_slice import BsdfSlice
@@ -69,6 +70,7 @@ class BsdfTable(Bsdf):
     """
 
     def __init__(self, data: BsdfData) -> None:
+        require(data, BsdfData, "BsdfTable: data", "a BsdfData; of a file et.read_bsdf(path) makes a table")
         if not data.slices and not data.components:
             raise ArgumentError("a BSDF has slices or components; these data hold neither")
         _require_one_of_each(data)

@@ -15,6 +15,7 @@ from etendue import _core
 from etendue.description.files import no_such_file
 from etendue.description.mistakes import join
 from etendue.errors import EtendueError, SceneError, SceneWarning, UnknownNameError
+from etendue.quantities.arguments import SCENE, require
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.spectrum import photopic_efficiency
 from etendue.scatter.members import same_when_turned
@@ -99,6 +100,7 @@ def compile_scene(scene: Scene) -> Compiled:
     >>> compiled.record["sources"][0]["wavelengths"].tolist(), compiled.flux_unit
     ([555.0], 'lm')
     """
+    require(scene, Scene, "compile_scene: scene", SCENE)
     return _Compiler(scene).compiled()
 
 

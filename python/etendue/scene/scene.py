@@ -19,6 +19,7 @@ from etendue.errors import SceneError
 from etendue.formats.input import as_path, require_readable
 from etendue.formats.other_kind import other_kind
 from etendue.formats.output import atomic_output
+from etendue.quantities.arguments import require
 from etendue.quantities.notebook import InNotebook
 from etendue.scene.detectors import AnyDetector
 from etendue.scene.finishes import BUILT_IN, AnyFinish
@@ -159,11 +160,12 @@ class Scene(Description, InNotebook):
         SceneError
             With every mistake.
         """
+        require(data, Mapping, "Scene.from_dict: data", "a mapping as files of scenes hold it")
         try:
             scene = cls.model_validate(dict(data))
         except ValidationError as error:
             raise SceneError(source, mistakes_of(error, data)) from None
-        return scene._at(Path(folder))  # noqa: SLF001 - an alternative constructor
+        return scene._at(as_path(folder))  # noqa: SLF001 - an alternative constructor
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -214,7 +216,7 @@ class Scene(Description, InNotebook):
         wavelength = 450
         """
         data = self.to_dict()
-        return to_toml(data if folder is None else _moved(data, self._folder, Path(folder)))
+        return to_toml(data if folder is None else _moved(data, self._folder, as_path(folder)))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a TOML file, whole or not at all; relative paths are written as seen from its folder.
@@ -226,7 +228,7 @@ class Scene(Description, InNotebook):
         ArgumentError
             If the folder does not exist.
         """
-        text = self.to_toml(Path(path).parent)
+        text = self.to_toml(as_path(path).parent)
         with atomic_output(path) as temporary:
             temporary.write_text(text, encoding="utf-8")
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError
-from etendue.quantities.arguments import as_numbers, require
+from etendue.quantities.arguments import as_numbers, as_whole, require
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
@@ -22,6 +22,9 @@ from etendue.quantities.ray_stream import DrawnRays
 from etendue.units import MM2_PER_M2, FluxUnit
 
 FloatArray = npt.NDArray[np.float64]
+
+MOST_SUBDIVISION = 1024
+"""Points along each side of a pixel."""
 
 
 def allocate_rays(rays: int, weights: Sequence[float]) -> tuple[int, ...]:
@@ -137,6 +140,7 @@ class RingSource(DrawnRays):
 
     def luminance(self, x: npt.ArrayLike, y: npt.ArrayLike) -> FloatArray:
         """Luminance at points of the plane [mm], in any direction above it [cd/m²]; 0 outside the rings."""
+        x, y = as_numbers(x, "RingSource.luminance: x"), as_numbers(y, "RingSource.luminance: y")
         zone = np.searchsorted(self.edges[1:], np.hypot(x, y), side="left")  # NaN sorts beyond the last ring
         seen: FloatArray = np.append(self.zone_luminance, 0.0)[zone]
         return seen
@@ -148,6 +152,9 @@ class RingSource(DrawnRays):
         the rings; it is what a reverse ray tracer does, and it has no noise. Error per edge pixel: below 1/`subdivision`
         of the step of luminance. The observer must be above the plane of the rings.
         """
+        require(observer, Observer, "RingSource: observer", "an Observer: et.Observer(theta, phi, distance)")
+        require(screen, Screen, "RingSource: screen", "a Screen: et.Screen(width, height, columns, rows)")
+        subdivision = as_whole(subdivision, "RingSource: subdivision", 1, MOST_SUBDIVISION)
         if observer.position[2] <= 0:
             raise ArgumentError(
                 "RingSource: the observer is not above the plane z = 0, and the rings emit upwards only."

@@ -6,6 +6,7 @@ import csv
 import dataclasses
 import io
 import itertools
+import numbers
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -16,6 +17,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.output import atomic_output
+from etendue.quantities.arguments import require, require_known, require_path
 from etendue.quantities.labelled import dataset
 from etendue.quantities.notebook import InNotebook
 from etendue.quantities.provenance import Provenance
@@ -74,6 +76,9 @@ class SweepTable(InNotebook):
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        for field in ("parameters", "values", "standard_error", "units"):
+            require(getattr(self, field), Mapping, f"SweepTable: {field}", "a mapping by name")
+        require(self.done, numbers.Integral, "SweepTable: done", "a whole number of steps")
         axes = {name: _frozen(values) for name, values in self.parameters.items()}
         shape = tuple(axis.size for axis in axes.values())
         object.__setattr__(self, "parameters", axes)
@@ -103,8 +108,7 @@ class SweepTable(InNotebook):
             If there is none of this name; suggests the nearest.
         """
         columns = {**self.parameters, **self.values}
-        if name not in columns:
-            raise UnknownNameError("parameter or measure", name, columns)
+        require_known(name, columns, "parameter or measure")
         return columns[name]
 
     def __len__(self) -> int:
@@ -128,6 +132,7 @@ class SweepTable(InNotebook):
 
     def unit(self, name: str) -> str:
         """Of a parameter or measure; empty if it has none."""
+        require(name, str, "SweepTable.unit: name", "that of a parameter or measure")
         return self.units.get(name, "")
 
     def best(self, measure: str) -> dict[str, float]:
@@ -138,8 +143,7 @@ class SweepTable(InNotebook):
         >>> SweepTable({"a": [5, 6]}, {"m": [3, 4]}, {"m": [0.1, 0.1]}, {}, done=2).best("m")
         {'a': 6.0}
         """
-        if measure not in self.values:
-            raise UnknownNameError("measure", measure, self.values)
+        require_known(measure, self.values, "measure")
         if np.isnan(self.values[measure]).all():
             raise ArgumentError(f"SweepTable: {measure} is unknown at all steps.")
         place = np.unravel_index(np.nanargmax(self.values[measure]), self.shape)
@@ -181,6 +185,7 @@ class SweepTable(InNotebook):
         ArgumentError
             If the folder does not exist.
         """
+        require_path(path)
         if Path(path).suffix.lower() not in EXTENSIONS:
             raise UnknownNameError("extension of a table", Path(path).suffix, EXTENSIONS)
         with atomic_output(path) as temporary:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Generic, TypeVar
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
+from etendue.quantities.arguments import require_known
 
 T = TypeVar("T")
 
@@ -40,8 +41,7 @@ class ByName(Mapping[str, T], Generic[T]):
 
     def __getitem__(self, name: str) -> T:
         """What the detector of this name saw."""
-        if name not in self._values:
-            raise UnknownNameError(self._kind, name, self._values)
+        require_known(name, self._values, self._kind)
         return self._values[name]
 
     def __contains__(self, name: object) -> bool:

@@ -6,7 +6,6 @@ import dataclasses
 import os
 from collections.abc import Iterator
 from functools import cached_property
-from pathlib import Path
 from typing import Any, TypeVar
 
 from etendue.formats.input import as_path
@@ -257,7 +256,7 @@ class TraceResult(InNotebook):
         OSError
             If there is no room for it.
         """
-        save_result(self.plan, self.sums, Path(path))
+        save_result(self.plan, self.sums, as_path(path))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> TraceResult:
@@ -273,6 +272,7 @@ class TraceResult(InNotebook):
         Examples
         --------
         >>> import etendue as et
+        >>> from pathlib import Path
         >>> from tempfile import TemporaryDirectory
         >>> result = et.trace(et.Scene(sources=[{"kind": "point", "flux": 1}]), rays=1000)
         >>> with TemporaryDirectory() as folder:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import require
 
 Array = npt.NDArray[np.float64]
 
@@ -50,6 +51,7 @@ class Section:
         ArgumentError
             If the text is no such equation.
         """
+        require(text, str, "section", "the plane across one of the axes, in mm, e.g. y=0 or z=12.5")
         match = re.fullmatch(r"\s*([xyz])\s*=\s*(\S+)\s*", text)
         try:
             at = float(match[2]) if match else math.nan

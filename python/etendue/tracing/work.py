@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import numbers
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 from etendue import _core
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import require
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.memory import require_memory
 from etendue.quantities.ray_stream import RayStream, checked_threads
@@ -108,6 +111,7 @@ class TraceWork:
         KeyboardInterrupt
             Upon Ctrl-C.
         """
+        require(number, numbers.Integral, "TraceWork: the number of a work unit", "a whole number")
         if not 0 <= number < len(self):
             raise ArgumentError(f"there is no work unit {number!r}; they are 0 to {len(self) - 1}.")
         plan, first = self.plan, number * BATCHES
@@ -130,9 +134,12 @@ class TraceWork:
         ArgumentError
             If there are no units, or they are not in their order.
         """
+        require(start, (TraceResult, NoneType), "TraceWork.join: start", "the TraceResult of the units before, or None")
+        require(units, Iterable, "TraceWork.join: units", "a list of what the work was called for")
         plan = self.plan
         sums = None if start is None else start.sums
         for unit in units:
+            require(unit, Mapping, "TraceWork.join: one of the units", "what the work gives when called")
             if sums is None:
                 sums = Sums.nothing(unit, plan.dealing, [detection.most_events for detection in plan.detections])
             sums = sums.then(unit, plan.dealing)
@@ -188,6 +195,7 @@ def trace_work(
         hint = "rays are put in a source: et.Scene(sources=[{'kind': 'rays', 'rays': rays}])"
         advice = hint if isinstance(given, RayStream) else "give an et.Scene, or the path of one"
         raise ArgumentError(f"a {type(given).__name__} is no scene; {advice}.")
+    require(before, (Plan, NoneType), "trace_work: before", "the plan of the trace that is gone on with, or None")
     threads = checked_threads(threads)
     compiled = compile_scene(scene)
     core = core_scene(compiled.record)

@@ -32,6 +32,7 @@ from etendue.formats.encodings import in_utf8, refuse_unmarked
 from etendue.formats.input import as_path, require_readable
 from etendue.formats.other_kind import other_kind
 from etendue.formats.output import atomic_output
+from etendue.quantities.arguments import require_known
 from etendue.quantities.bsdf_data import BsdfData
 
 BSDF_FORMATS: dict[str, BsdfFormat] = {
@@ -134,8 +135,7 @@ def bsdf_format(path: Path, name: str | None) -> BsdfFormat:
         If there is no such format, or no format has the extension.
     """
     if name is not None:
-        if name not in BSDF_FORMATS:
-            raise UnknownNameError("BSDF format", name, BSDF_FORMATS)
+        require_known(name, BSDF_FORMATS, "BSDF format")
         return BSDF_FORMATS[name]
     # Of ".bsdf" and ".lt.bsdf" the longer one says more.
     endings = sorted(

@@ -12,7 +12,7 @@ from etendue.formats.input import as_path, is_stream, require_file
 from etendue.formats.intensity import eulumdat, gldf, lm63, tm33
 from etendue.formats.intensity.intensity_format import IntensityFormat
 from etendue.formats.output import atomic_output
-from etendue.quantities.arguments import INTENSITY, require
+from etendue.quantities.arguments import INTENSITY, require, require_known, require_number, require_path
 from etendue.quantities.intensity import Intensity
 
 INTENSITY_FORMATS: dict[str, IntensityFormat] = {
@@ -137,14 +137,14 @@ def write_intensity(
     ArgumentError
         If the format cannot hold the distribution at all.
     """
-    require(path, (str, os.PathLike), "write_intensity: path", "the path of the file first, then the Intensity")
+    require_path(path, "write_intensity: path", "the path of the file first, then the Intensity")
     require(intensity, Intensity, "write_intensity: intensity", INTENSITY)
+    require_number(rotate, "write_intensity: rotate", "a number of degrees")
     path = Path(path)
     writable = {name: f for name, f in INTENSITY_FORMATS.items() if f.write}
     by_extension = {f.extension: f for f in writable.values()}
     if format is not None:
-        if format not in writable:
-            raise UnknownNameError("intensity format that can be written", format, writable)
+        require_known(format, writable, "intensity format that can be written")
         chosen = writable[format]
     elif path.suffix.lower() in by_extension:
         chosen = by_extension[path.suffix.lower()]

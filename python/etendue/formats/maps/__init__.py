@@ -205,7 +205,7 @@ def save_map(lmap: AnyMap, path: str | os.PathLike[str]) -> tuple[str, ...]:
     ArgumentError
         If the directory does not exist or a number is too large for the format.
     """
-    path = Path(path)
+    path = as_path(path)
     extension = path.suffix.lower()
     if extension in PICTURE_EXTENSIONS:
         lmap.plot(path)

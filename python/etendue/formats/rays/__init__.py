@@ -26,7 +26,7 @@ from etendue.formats.rays import (
     zemax_text,
 )
 from etendue.formats.rays.ray_format import RayFormat
-from etendue.quantities.arguments import require
+from etendue.quantities.arguments import require, require_path
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
 from etendue.units import FluxUnit
@@ -160,7 +160,7 @@ def write_rays(
         If the extension belongs to none or to several, there are no rays or more than the format holds, or they have no
         position and the format needs one.
     """
-    require(path, (str, os.PathLike), "write_rays: path", "the path of the file first, then the rays")
+    require_path(path, "write_rays: path", "the path of the file first, then the rays")
     require(rays, RayStream, "write_rays: rays", "rays, of a file et.read_rays(path)")
     path = Path(path)
     chosen = format_named(format) if format is not None else _format_for(path)

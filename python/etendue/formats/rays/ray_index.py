@@ -16,6 +16,7 @@ from etendue.formats.input import as_path
 from etendue.formats.output import atomic_output
 from etendue.formats.rays.index_building import Counted, IndexTables, Records, count_rays, fill_index
 from etendue.formats.rays.index_file import DAMAGED, HEADER, map_new, read_index, text_of, write_tables
+from etendue.quantities.arguments import require, require_callable
 from etendue.quantities.file_records import AnyRecords
 from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.ray_set import RaySet
@@ -90,6 +91,8 @@ class RayIndex(RaySet):
         >>> len(index), round(index.total_flux, 9)
         (1000, 600.0)
         """
+        require(rays, RayStream, "RayIndex.build: rays", "rays, of a file et.read_rays(path)")
+        require_callable(progress)
         if path is None:
             counted = count_rays(rays, threads, progress)
             records: Records = np.zeros(counted.rays, counted.dtype)

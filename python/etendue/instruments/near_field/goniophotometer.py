@@ -21,7 +21,7 @@ from etendue.instruments.near_field.run import NearFieldRun
 from etendue.instruments.near_field.setting import Setting, counts_dtype
 from etendue.quantities.arguments import as_point, require_callable, require_number, require_numbers
 from etendue.quantities.observer import Observer, Screen
-from etendue.quantities.ray_stream import checked_seed
+from etendue.quantities.ray_stream import checked_seed, checked_threads
 from etendue.quantities.spool import Spool
 
 Array = npt.NDArray[np.float64]
@@ -191,7 +191,8 @@ class NearFieldGoniophotometer:
             As the reading of a file.
         """
         require_callable(progress)
-        source = lamp_of(lamp, samples, size, checked_seed(seed), threads)
+        seed, threads = checked_seed(seed), checked_threads(threads)
+        source = lamp_of(lamp, samples, size, seed, threads)
         setting, around = self._setting(source)
         workers = threads or os.cpu_count() or 1
         stops, seen, light, light_error, brightest = self._look(source, setting, around, seed, progress)

@@ -20,7 +20,7 @@ from etendue.luminance.looking import look_at_field
 from etendue.luminance.methods import PathTracing
 from etendue.luminance.opening import open_source
 from etendue.luminance.scene_map import SeenScene, look_at_scene
-from etendue.quantities.arguments import require
+from etendue.quantities.arguments import require, require_number
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import RayStream
@@ -239,6 +239,9 @@ class FunctionLamp(Lamp):
             raise ArgumentError(
                 "of a function it is not known how large the lamp is: state `size`, its diameter in mm."
             )
+        require_number(size, "size", "the diameter of the lamp in mm")
+        if not 0.0 < size < math.inf:
+            raise ArgumentError(f"size is {size:g}; give the diameter of the lamp in mm, above 0.")
         self._luminance, self._size, self._seed = luminance, size, seed
         self._samples = samples
         self.name, self.provenance = "a function", Provenance("function")

@@ -119,7 +119,7 @@ class ArmPositions:
 
     def nearest(self, gamma: float, c: float) -> int:
         """The position closest to a direction."""
-        towards = _directions(np.array([gamma]), np.array([c]))[0]
+        towards = _directions(np.array([float(gamma)]), np.array([float(c)]))[0]
         return int(np.argmax(_directions(self.gamma, self.c) @ towards))
 
     def drawn(self, stops: npt.NDArray[np.intp], rng: np.random.Generator) -> Array:

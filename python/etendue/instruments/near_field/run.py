@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
 from functools import cached_property
 from pathlib import Path
@@ -21,6 +22,7 @@ from etendue.instruments.near_field.starting_points import closest_surface
 from etendue.instruments.near_field.storage import read_run, write_run
 from etendue.lightfield.carrier import Surface
 from etendue.lightfield.light_field import LightField
+from etendue.quantities.arguments import SURFACE, as_whole, require, require_callable, require_number
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer
@@ -193,6 +195,7 @@ class NearFieldRun:
 
     def sees_light(self, position: int) -> bool:
         """Whether the image of a position is not dark."""
+        position = as_whole(position, "sees_light: position", 0, len(self.setting.positions) - 1)
         return bool(self._merged[0][self.start[position] : self.start[position + 1]].any())
 
     def luminance_map(self, gamma: float, c: float = 0.0) -> LuminanceMap:
@@ -208,6 +211,10 @@ class NearFieldRun:
         LuminanceMap
             With the noise of the camera as its standard error.
         """
+        for name, angle in (("gamma", gamma), ("c", c)):
+            require_number(angle, f"NearFieldRun.luminance_map: {name}", "an angle in °")
+            if not math.isfinite(angle):
+                raise ArgumentError(f"NearFieldRun.luminance_map: {name} is {angle:g}; give an angle in °.")
         stops, screen = self.setting.positions, self.setting.screen
         k = stops.nearest(gamma, c)
         some = slice(self.start[k], self.start[k + 1])
@@ -239,8 +246,7 @@ class NearFieldRun:
             If there are not as many.
         """
         camera = self.setting.camera
-        if not 1 <= exposures <= camera.exposures:
-            raise ArgumentError(f"{exposures} of {camera.exposures} exposures; give 1 to {camera.exposures}.")
+        exposures = as_whole(exposures, "NearFieldRun.using: exposures", 1, camera.exposures)
         if exposures == camera.exposures:
             return self
         records = np.zeros(len(self.records), dtype=counts_dtype(exposures))
@@ -261,6 +267,7 @@ class NearFieldRun:
         int or None
             None if those of this measurement are not enough, or something else is wrong.
         """
+        require_number(error, "exposures_needed: error", "a share of the flux")
         for n in range(1, self.setting.camera.exposures + 1):
             if self.using(n).disagreement <= error:
                 return n
@@ -356,11 +363,11 @@ class NearFieldRun:
         ArgumentError
             If the number of rays is impossible, or there is no such seed.
         """
-        if rays is not None and not 1 <= rays <= 10**11:
-            raise ArgumentError(f"{rays} rays; give at least one.")
+        n = None if rays is None else as_whole(rays, "NearFieldRun.ray_set: rays", 1, 10**11)
+        require_callable(progress)
         pixels = self._pixel_rays
         at = self._surface(surface, checked_seed(seed))
-        n = pixels.flux.size if rays is None else int(rays)
+        n = pixels.flux.size if n is None else n
         summed = None if rays is None else np.cumsum(pixels.flux, dtype=np.float64)
         offset = float(np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 7)))).random())
         spool, astray = Spool(RECORD), 0.0
@@ -393,7 +400,7 @@ class NearFieldRun:
         return RaySet.from_records(records, meaning)
 
     def _surface(self, surface: Surface | Literal["closest"], seed: int) -> Surface:
-        if surface == "closest":
+        if isinstance(surface, str) and surface == "closest":
             return self.closest_surface(seed)
         if not isinstance(surface, Surface):
             raise ArgumentError(f"{surface!r} is no surface; give et.Sphere(…), et.Box(…), … or 'closest'.")
@@ -413,6 +420,8 @@ class NearFieldRun:
         progress : callable, optional
             Called with the rays that are done.
         """
+        require_callable(progress)
+        require(surface, (str, Surface), "NearFieldRun.light_field: surface", f"'auto', or {SURFACE}")
         return LightField.fit(self.ray_set(None, seed=seed), surface, seed=seed, progress=progress)
 
     # --- files -------------------------------------------------------------------------------------------------------

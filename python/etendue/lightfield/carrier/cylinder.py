@@ -7,10 +7,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.lightfield.carrier.part import Part, Triple, triple
 from etendue.lightfield.carrier.sizing import SLACK, places_and_directions, radius_for, span
 from etendue.lightfield.carrier.surface import Surface
+from etendue.quantities.arguments import require_known
 from etendue.quantities.ray_stream import RayStream
 
 AXES = ("x", "y", "z")
@@ -61,8 +62,7 @@ class Cylinder(Surface):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.axis not in AXES:
-            raise UnknownNameError("axis of a cylinder", str(self.axis), AXES)
+        require_known(self.axis, AXES, "axis of a cylinder")
         if self.bottom is not None and self.top is not None and not self.top > self.bottom:
             raise ArgumentError(f"Cylinder: top {self.top:g} is not above bottom {self.bottom:g}.")
 

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import as_numbers
 from etendue.quantities.patches import AngularGrid
 
 Array = npt.NDArray[np.float64]
@@ -50,6 +51,11 @@ def sequence(coarsest: Sequence[int] = COARSEST, finest: Sequence[int] = FINEST)
     >>> [(grid.theta_step, grid.phi_step) for grid in sequence((18, 60), (9, 36))]
     [(18, 60), (15, 45), (10, 40), (9, 36)]
     """
+    for told, given in (("coarsest", coarsest), ("finest", finest)):
+        wanted = "two whole numbers of degrees, Δθ and Δφ"
+        shape = as_numbers(given, f"{told} bins", wanted).shape
+        if shape != (2,):
+            raise ArgumentError(f"{told} bins: shape {shape}; give {wanted}.")
     lists = []
     for name, whole, first, last in zip(("Δθ", "Δφ"), WHOLE, coarsest, finest, strict=True):
         steps = [step for step in range(whole, 0, -1) if whole % step == 0]

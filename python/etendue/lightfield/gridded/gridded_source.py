@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import operator
 import os
 from collections.abc import Iterable
 from typing import Any
@@ -23,18 +22,21 @@ from etendue.lightfield.gridded.reading import read_gridded
 from etendue.lightfield.gridded.sampling import RECORD, sampled_records
 from etendue.lightfield.gridded.summing import summed_intensity
 from etendue.lightfield.pilot_sample import check_near_field
-from etendue.quantities.arguments import SURFACE, require, require_callable, require_number
+from etendue.quantities.arguments import SURFACE, as_numbers, as_whole, require, require_callable, require_number
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.patches import Patches
 from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.ray_set import RaySet
-from etendue.quantities.ray_stream import Progress, RayStream
+from etendue.quantities.ray_stream import Progress, RayStream, checked_seed
 from etendue.quantities.spool import spool
 from etendue.units import MM2_PER_M2, FluxUnit
 
 LINES = 1 << 18
 """Lines that `GriddedSource.luminance` follows at once."""
+
+MOST_RAYS = (1 << 50) - 1
+"""Rays that may be drawn at once."""
 
 RAYS_OF_ERROR = 10.0
 """A threshold suits a number of rays if it is the flux of so many of a patch's own: found by sweeps over the threshold."""
@@ -242,6 +244,7 @@ class GriddedSource:
         ArgumentError
             If the flux is not a number above 0.
         """
+        require_number(flux, "flux", f"a number of {self.flux_unit} above 0")
         if not (math.isfinite(flux) and flux > 0.0):
             raise ArgumentError(f"flux is {flux!r}; give a number of {self.flux_unit} above 0.")
         return dataclasses.replace(self, stated_flux=float(flux))
@@ -302,7 +305,7 @@ class GriddedSource:
         ArgumentError
             If the shapes are others, a number is not finite, or a direction has no length.
         """
-        points, directions = (np.asarray(v, dtype=np.float64) for v in (points, directions))
+        points, directions = as_numbers(points, "luminance: points"), as_numbers(directions, "luminance: directions")
         if points.ndim != 2 or points.shape[1] != 3 or points.shape != directions.shape:
             raise ArgumentError(
                 f"luminance: points {points.shape} and directions {directions.shape}; give (m, 3) of each."
@@ -375,13 +378,9 @@ class GriddedSource:
         Raises
         ------
         ArgumentError
-            If `n` is below 1 or the seed out of range.
+            If `n` or the seed is no whole number, or out of its range.
         """
-        n, seed = operator.index(n), operator.index(seed)
-        if n < 1:
-            raise ArgumentError(f"sample: {n} rays; ask for 1 or more.")
-        if not 0 <= seed < 2**64:
-            raise ArgumentError(f"sample: seed {seed}; give 0 to 2^64 - 1.")
+        n, seed = as_whole(n, "sample: n", 1, MOST_RAYS), checked_seed(seed)
         records = spool(sampled_records(self.surface, self.patches, self.emitted_flux, n, seed), RECORD)
         provenance = self.patches.provenance.then(f"{n} rays drawn from {len(self.patches)} patches, seed {seed}")
         meaning = RaySetMeaning(flux_unit=self.flux_unit, provenance=provenance, notes=(self.flux_note,))

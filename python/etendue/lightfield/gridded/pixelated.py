@@ -10,12 +10,12 @@ from typing import Literal
 
 import numpy as np
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.lightfield.carrier import Part, Surface
 from etendue.lightfield.carrier.part import FLAT
 from etendue.lightfield.gridded.curved_pixels import CylindricalPixels, SphericalPixels
 from etendue.lightfield.gridded.pixels import SLACK, Array, Cells, Indices, Pixelation, SquarePixels, flat_size
-from etendue.quantities.arguments import require, require_number
+from etendue.quantities.arguments import require, require_known, require_number
 
 CentreOn = Literal["auto", "corner", "pixel"]
 CENTRES: tuple[CentreOn, ...] = ("auto", "corner", "pixel")
@@ -90,8 +90,7 @@ class PixelatedSurface:
         require_number(pixel, "pixel", "the side of a pixel in mm, above 0")
         if not (math.isfinite(pixel) and pixel > 0.0):
             raise ArgumentError(f"pixel is {pixel!r}; give the side of a pixel in mm, above 0.")
-        if centre_on not in CENTRES:
-            raise UnknownNameError("place of the lattice", centre_on, CENTRES)
+        require_known(centre_on, CENTRES, "place of the lattice")
         parts = surface.parts()
         if any(part.focus != FLAT or part.hole > 0.0 for part in parts):
             raise ArgumentError(

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-import operator
 
 import numpy as np
 
-from etendue.errors import ArgumentError
 from etendue.lightfield.gridded.pixels import Array
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.intensity_nodes import Nodes
@@ -42,13 +40,7 @@ def summed_intensity(patches: Patches, c_planes: int, gamma_step: float) -> Inte
     ArgumentError
         If there are no such planes or steps.
     """
-    c_planes = operator.index(c_planes)
-    rows = round(180.0 / gamma_step) if math.isfinite(gamma_step) and gamma_step > 0.0 else 0
-    if c_planes < 1:
-        raise ArgumentError(f"c_planes is {c_planes}; give 1 or more.")
-    if rows < 2 or not math.isclose(rows * gamma_step, 180.0, rel_tol=1e-9):
-        raise ArgumentError(f"gamma_step is {gamma_step}°; give a whole part of 180°, at most 90°.")
-    nodes = Nodes.even(c_planes, gamma_step)
+    nodes, rows = Nodes.even(c_planes, gamma_step), round(180.0 / gamma_step)
     tables = _added_up(patches)
     points = int(np.clip(math.isqrt(WORK // max(1, len(tables) * len(nodes))), 1, MOST_POINTS))
     # Midpoints of even steps in C and γ, a number of them between any two nodes.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.rt300s import is_rt300s, read_rt300s
 from etendue.formats.scans_csv import DIRECTIONS, ERROR, STAGES, read_columns, read_remarks
+from etendue.quantities.arguments import described, require, require_number, require_path
 from etendue.quantities.bsdf_directions import direction
 from etendue.scatter.scans.goniometer import bsdf_of_flux, detector_direction, incident_direction
 from etendue.scatter.scans.scans import Scans
@@ -74,8 +75,20 @@ def read_scans(
     ...     read_scans([path]).values.tolist()
     [2.5, 0.4]
     """
+    wanted = "a list of paths, also of one file: [path]"
+    if isinstance(paths, str | bytes | os.PathLike):
+        raise ArgumentError(f"read_scans: paths is {described(paths)}; give {wanted}.")
+    require(paths, Iterable, "read_scans: paths", wanted)
+    paths = list(paths)
+    for path in paths:
+        require_path(path, "read_scans: one of the paths")
+    for name, other in (("incident_flux", incident_flux), ("blank", blank)):
+        if other is not None:
+            require_path(other, f"read_scans: {name}", "the path of a file, or None")
+    if solid_angle is not None:
+        require_number(solid_angle, "read_scans: solid_angle", "that of the aperture in sr, or None")
     if not paths:
-        raise ArgumentError("no file of scans is given")
+        raise ArgumentError("read_scans: no file of scans is given")
     incident: list[Array] = []
     scattered: list[Array] = []
     values: list[Array] = []

@@ -8,9 +8,11 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from etendue.errors import ArgumentError, UnknownNameError
+from etendue.errors import ArgumentError
 from etendue.extras import require
 from etendue.formats.bsdf.points import below_zero
+from etendue.quantities.arguments import SCANS, require_known
+from etendue.quantities.arguments import require as require_kind
 from etendue.quantities.bsdf_data import BsdfData
 from etendue.quantities.bsdf_directions import light_from
 from etendue.quantities.bsdf_slice import BsdfSlice
@@ -344,8 +346,8 @@ def tabulated(scans: Scans, method: str = AUTOMATIC, smallest: float = SMALLEST)
     >>> round(tabulated(flat, method="shepard").slices[0].integral(), 3)
     0.785
     """
-    if method not in (*METHODS, AUTOMATIC):
-        raise UnknownNameError("method of interpolation", method, [*METHODS, AUTOMATIC])
+    require_kind(scans, Scans, "scans", SCANS)
+    require_known(method, (*METHODS, AUTOMATIC), "method of interpolation")
     turns: list[float] = []
     for incident, _ in scans.by_incidence():
         phi = _azimuth(incident)

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.quantities.arguments import as_numbers, require_number, require_numbers
 from etendue.scatter.scans.goniometer import bsdf_of_flux, detector_direction, incident_direction
 
 Array = npt.NDArray[np.float64]
@@ -61,8 +62,9 @@ class Scans:
     def __post_init__(self) -> None:
         for name in ("incident", "scattered", "values", "standard_error"):
             given = getattr(self, name)
-            if given is not None:
-                object.__setattr__(self, name, np.array(given, np.float64))
+            if given is not None or name != "standard_error":
+                object.__setattr__(self, name, as_numbers(given, f"Scans: {name}", copy=True))
+        require_numbers(self, "reflectance", "transmittance", instead="a share of the light", none=True)
         n = self.values.shape
         if len(n) != 1 or not n[0] or self.incident.shape != (*n, 3) or self.scattered.shape != (*n, 3):
             raise ArgumentError("scans are n pairs of directions of shape (n, 3) with n values")
@@ -124,11 +126,16 @@ class Scans:
         >>> raw.values.round(4).tolist(), raw.scattered.round(3).tolist()
         ([0.1155], [[-0.5, 0.0, 0.866]])
         """
-        angles = np.array(stages, np.float64)
+        angles = as_numbers(stages, "Scans.from_stages: stages", "rows of α, β, γ, δ in °")
+        scattered, arriving = (
+            as_numbers(flux, f"Scans.from_stages: {name}", "a flux, or one for each position")
+            for name, flux in (("scattered_flux", scattered_flux), ("incident_flux", incident_flux))
+        )
+        require_number(solid_angle, "Scans.from_stages: solid_angle", "that of the aperture in sr")
         if angles.ndim != 2 or angles.shape[1] != 4:
             raise ArgumentError("stages are rows of α, β, γ, δ")
         to = detector_direction(*angles.T)
-        f = bsdf_of_flux(scattered_flux, incident_flux, solid_angle=solid_angle, direction=to)
+        f = bsdf_of_flux(scattered, arriving, solid_angle=solid_angle, direction=to)
         incident = incident_direction(angles[:, 2], angles[:, 3])
         return cls(incident, to, f, reflectance=reflectance, transmittance=transmittance)
 
