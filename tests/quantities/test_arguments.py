@@ -378,7 +378,7 @@ CALLS: dict[str, tuple[Callable[[Any], object], tuple[Any, ...]]] = {
     ),
     "plot_near_field: c is": (lambda wrong: et.plot_near_field(run(), c=wrong), (*NO_NUMBERS, np.nan, np.inf)),
     "NearFieldRun.luminance_map: gamma is": (lambda wrong: run().luminance_map(wrong), (*NO_NUMBERS, np.nan)),
-    "NearFieldRun.ray_set: rays ": (lambda wrong: run().ray_set(wrong), ("9", [9], 0, 1e6, LMAP)),
+    "NearFieldRun.ray_set: rays ": (lambda wrong: run().ray_set(wrong), ("9", [9], 0, 1.5, np.nan, 1e12, LMAP)),
     "NearFieldRun.using: exposures ": (lambda wrong: run().using(wrong), (*NO_NUMBERS, 0, 2)),
     "exposures_needed: error ": (lambda wrong: run().exposures_needed(wrong), NO_NUMBERS),
     "sees_light: position ": (lambda wrong: run().sees_light(wrong), (*NO_NUMBERS, -1, 10**6)),

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from etendue.description.values import is_number
 from etendue.errors import ArgumentError
 from etendue.formats.input import as_path
 from etendue.instruments.near_field.far_field import far_field_notes, linear_notes, step_notes, table_notes
@@ -22,7 +23,7 @@ from etendue.instruments.near_field.starting_points import closest_surface
 from etendue.instruments.near_field.storage import read_run, write_run
 from etendue.lightfield.carrier import Surface
 from etendue.lightfield.light_field import LightField
-from etendue.quantities.arguments import SURFACE, as_whole, require, require_callable, require_number
+from etendue.quantities.arguments import SURFACE, as_whole, described, require, require_callable, require_number
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer
@@ -38,6 +39,9 @@ Integers = npt.NDArray[np.intp]
 
 RECORD = np.dtype([("position", "<f4", (3,)), ("direction", "<f4", (3,)), ("flux", "<f4")])
 """A ray, as ray files hold it."""
+
+MOST_RAYS = 10**11
+"""That may be drawn from the pixels."""
 
 PILOT = 1 << 14
 """Rays that show where they may start."""
@@ -363,11 +367,14 @@ class NearFieldRun:
         ArgumentError
             If the number of rays is impossible, or there is no such seed.
         """
-        n = None if rays is None else as_whole(rays, "NearFieldRun.ray_set: rays", 1, 10**11)
+        if rays is not None and not (is_number(rays) and 1 <= rays <= MOST_RAYS and int(rays) == rays):
+            raise ArgumentError(
+                f"NearFieldRun.ray_set: rays is {described(rays)}; give a whole number from 1 to {MOST_RAYS:,}, or None."
+            )
         require_callable(progress)
         pixels = self._pixel_rays
         at = self._surface(surface, checked_seed(seed))
-        n = pixels.flux.size if n is None else n
+        n = pixels.flux.size if rays is None else int(rays)
         summed = None if rays is None else np.cumsum(pixels.flux, dtype=np.float64)
         offset = float(np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 7)))).random())
         spool, astray = Spool(RECORD), 0.0
