@@ -86,7 +86,7 @@ ADDITIONS: dict[str, Addition] = {
         {f"{BSDFS}/minnaert.rs": "minnaert.rs", f"{MODELS}/minnaert.py": "minnaert_finish.py"},
         (
             Insertion(f"{BSDFS}/mod.rs", "mod lobe;\n", "mod minnaert;\n"),
-            Insertion(f"{BSDFS}/mod.rs", "pub use lobe::{Lobe, Profile};\n", "pub use minnaert::Minnaert;\n"),
+            Insertion(f"{BSDFS}/mod.rs", "pub use lobe::Lobe;\n", "pub use minnaert::Minnaert;\n"),
             Insertion(
                 f"{BSDFS}/mod.rs",
                 '            Lobe::named("lobe"),\n',

@@ -26,18 +26,6 @@ mod rough_coat;
 mod rough_interface;
 mod rough_metal;
 mod shares;
-mod table_arrivals;
-mod table_base;
-mod table_draw;
-mod table_grid;
-mod table_hats;
-mod table_lanes;
-mod table_lobes;
-mod table_nodes;
-mod table_sides;
-mod table_slice;
-mod table_steps;
-mod table_waiting;
 mod tabulated;
 #[cfg(test)]
 mod tests;
@@ -56,10 +44,7 @@ pub use rough_coat::RoughCoat;
 pub use rough_interface::RoughInterface;
 pub use rough_metal::RoughMetal;
 pub use shares::{Component, Shares};
-pub use table_lobes::{Row, Way};
-pub use table_sides::Side;
-pub use table_slice::Slice;
-pub use tabulated::Tabulated;
+pub use tabulated::{Row, Side, Slice, Tabulated, Way};
 
 /// A BSDF from the name of its kind and its parameters; None if there is no such kind.
 ///

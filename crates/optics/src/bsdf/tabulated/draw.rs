@@ -7,12 +7,12 @@
 use etendue_math::trig::sin_cos_turns;
 use multiversion::multiversion;
 
-use super::drawn::Outcome;
-use super::table_arrivals::{ABSORBED, Arrivals, Lanes, OFF_SLICE, TOGETHER};
-use super::table_base::Base;
-use super::table_lanes::{LANES, blocks};
-use super::table_lobes::Lobe;
-use super::table_waiting::Waiting;
+use super::arrivals::{ABSORBED, Arrivals, Lanes, OFF_SLICE, TOGETHER};
+use super::base::Base;
+use super::lanes::{LANES, blocks};
+use super::lobes::Lobe;
+use super::waiting::Waiting;
+use crate::bsdf::drawn::Outcome;
 
 /// What scatters rays that meet the same side of a surface, and where to.
 pub(super) struct Group {
@@ -33,7 +33,7 @@ impl Group {
 
     /// Draws for rays that meet one side, and sends those that are scattered up or down: see [`Bsdf::sample_many`].
     ///
-    /// [`Bsdf::sample_many`]: super::contract::Bsdf::sample_many
+    /// [`Bsdf::sample_many`]: crate::bsdf::contract::Bsdf::sample_many
     pub fn draw(
         &mut self,
         (lobe, base, up): (&Lobe, &Base, bool),
@@ -67,7 +67,7 @@ impl Group {
     }
 }
 
-/// Directions off the base, as [`by_cosine`](super::contract::by_cosine) says of the square of a sine. Those of rays off slices
+/// Directions off the base, as [`by_cosine`](crate::bsdf::contract::by_cosine) says of the square of a sine. Those of rays off slices
 /// mean nothing.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn off_base(group: &mut Group, count: usize, sign: f64) {

@@ -2,8 +2,8 @@
 
 use etendue_sampling::guide::Guide;
 
-use super::monotone_cubic::Cubic;
-use super::table_grid::{Grid, Integrals};
+use super::grid::{Grid, Integrals};
+use crate::bsdf::monotone_cubic::Cubic;
 
 /// Numbers by the sine of incidence, parabolas in few steps: few enough for the nearest caches.
 #[derive(Clone, Debug, Default)]
@@ -308,7 +308,7 @@ impl Blend {
 mod tests {
     use etendue_math::special::exp;
 
-    use super::super::table_slice::Slice;
+    use super::super::slice::Slice;
     use super::*;
 
     #[test]

@@ -9,10 +9,10 @@ use etendue_sampling::ordered::inside;
 use etendue_sampling::warp::part_of;
 use rayon::prelude::*;
 
-use super::monotone_cubic::Cubic;
-use super::table_grid::Grid;
-use super::table_slice::Slice;
-use super::table_steps::{Step, Steps};
+use super::grid::Grid;
+use super::slice::Slice;
+use super::steps::{Step, Steps};
+use crate::bsdf::monotone_cubic::Cubic;
 
 /// Shares that should add up to 1 may fall short of it by as much as they are rounded; what reaches this is all of the light.
 pub(super) const ALL: f64 = 1.0 - 1e-6;

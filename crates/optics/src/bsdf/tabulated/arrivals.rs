@@ -3,9 +3,9 @@
 use etendue_sampling::warp::part_of;
 use multiversion::multiversion;
 
-use super::table_base::{Base, Within};
-use super::table_lanes::{LANES, Lanes as AnyLanes, blocks};
-use super::table_lobes::{ALL, Lobe};
+use super::base::{Base, Within};
+use super::lanes::{LANES, Lanes as AnyLanes, blocks};
+use super::lobes::{ALL, Lobe};
 
 /// How many rays are taken in together, in so many blocks.
 pub(super) const TOGETHER: usize = BLOCKS * LANES;

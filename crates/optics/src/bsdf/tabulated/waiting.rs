@@ -6,12 +6,12 @@ use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 use multiversion::multiversion;
 
-use super::contract::by_cosine;
-use super::table_arrivals::Arrivals;
-use super::table_grid::Grid;
-use super::table_lanes::{LANES, Lanes, blocks};
-use super::table_lobes::{Incidence, Lobe};
-use super::table_nodes::{ENOUGH, MOST, Nodes, WaitingLanes};
+use super::arrivals::Arrivals;
+use super::grid::Grid;
+use super::lanes::{LANES, Lanes, blocks};
+use super::lobes::{Incidence, Lobe};
+use super::nodes::{ENOUGH, MOST, Nodes, WaitingLanes};
+use crate::bsdf::contract::by_cosine;
 
 /// How often is tried for a point within the unit circle.
 const TRIES: u32 = 10_000;

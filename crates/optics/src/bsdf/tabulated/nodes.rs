@@ -4,11 +4,11 @@ use etendue_sampling::alias::UNIT;
 use etendue_sampling::warp::part_of;
 use multiversion::multiversion;
 
-use super::table_arrivals::TOGETHER;
-use super::table_grid::half;
-use super::table_hats::Hat;
-use super::table_lanes::{LANES, Lanes, blocks};
-use super::table_lobes::Lobe;
+use super::arrivals::TOGETHER;
+use super::grid::half;
+use super::hats::Hat;
+use super::lanes::{LANES, Lanes, blocks};
+use super::lobes::Lobe;
 
 /// So many rays are worth working on together.
 pub(super) const ENOUGH: usize = 2 * LANES;

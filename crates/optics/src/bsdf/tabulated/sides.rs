@@ -3,10 +3,10 @@
 use etendue_math::Vec3;
 use etendue_sampling::warp::part_of;
 
-use super::contract::Media;
-use super::table_base::Base;
-use super::table_grid::Grid;
-use super::table_lobes::{Incidence, Lit, Lobe, Lobes, Way};
+use super::base::Base;
+use super::grid::Grid;
+use super::lobes::{Incidence, Lit, Lobe, Lobes, Way};
+use crate::bsdf::contract::Media;
 
 /// Tables of light that meets one side: reflected and transmitted, by wavelength \[nm\].
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -6,7 +6,7 @@
 use etendue_math::Vec3;
 use etendue_sampling::guide::Guide;
 
-use super::contract::by_cosine;
+use crate::bsdf::contract::by_cosine;
 
 /// l, the luminance over that of Lambertian light of the same flux, on one side of a surface. Between cosines of the angle from
 /// the normal that fall evenly from 1 to 0 it is linear in the square of the sine, by which projected solid angle is even.

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use etendue_math::trig::sin_cos_turns;
 use etendue_sampling::alias::{Alias, Slot};
 
-use super::table_hats::Hat;
-use super::table_slice::Slice;
+use super::hats::Hat;
+use super::slice::Slice;
 
 /// A slice that can be asked and drawn from.
 #[derive(Clone, Debug)]

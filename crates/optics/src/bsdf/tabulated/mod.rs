@@ -19,15 +19,33 @@ use std::sync::Arc;
 use etendue_geometry::surface_points::Vectors;
 use etendue_math::Vec3;
 
-use super::contract::{Bsdf, Facts, Media, Parts, Product};
-use super::drawn::{Drawn, Outcome};
-use super::shares::Shares;
-use super::table_base::Base;
-use super::table_draw::Group;
-use super::table_grid::Grid;
-use super::table_lobes::{ALL, Incidence, Lobes};
-use super::table_sides::{Side, Sides, on_its_way, pick, share};
-use super::table_waiting::off_slice;
+use crate::bsdf::contract::{Bsdf, Facts, Media, Parts, Product};
+use crate::bsdf::drawn::{Drawn, Outcome};
+use crate::bsdf::shares::Shares;
+
+mod arrivals;
+mod base;
+mod draw;
+mod grid;
+mod hats;
+mod lanes;
+mod lobes;
+mod nodes;
+mod sides;
+mod slice;
+mod steps;
+mod waiting;
+
+use base::Base;
+use draw::Group;
+use grid::Grid;
+use lobes::{ALL, Incidence, Lobes};
+use sides::{Sides, on_its_way, pick, share};
+use waiting::off_slice;
+
+pub use lobes::{Row, Way};
+pub use sides::Side;
+pub use slice::Slice;
 
 /// A table of scattered light.
 #[derive(Clone, Debug)]
@@ -254,15 +272,15 @@ impl Product for Tabulated {
 }
 
 #[cfg(test)]
-impl super::examples::Examples for Tabulated {
+impl crate::bsdf::examples::Examples for Tabulated {
     // f has kinks at the nodes of each slice. A quadrature of 16 times the steps leaves 4e-6.
     const QUADRATURE: f64 = 2e-4;
 
     fn examples() -> Vec<Self> {
         use std::f64::consts::TAU;
 
-        use super::table_lobes::{Row, Way};
-        use super::table_slice::Slice;
+        use self::lobes::{Row, Way};
+        use self::slice::Slice;
 
         let slice = |azimuths: usize, width: f64, [skew, aside]: [f64; 2], sine: f64, [share, base]: [f64; 2]| {
             let radial: Vec<f64> = (0..24).map(|i| 2.0 * (f64::from(i) / 23.0).powi(2)).collect();
