@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import math
 import os
+from types import NoneType
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +19,7 @@ from etendue.formats.scans_csv import DIRECTIONS, ERROR, POLAR, read_columns, re
 from etendue.instruments.bench import Bench
 from etendue.instruments.goniometer_scan import GoniometerScan, Way, flux_of_unit_bsdf, known_of, read_goniometer_scan
 from etendue.instruments.lobe_table import polar_slice
-from etendue.quantities.arguments import as_numbers, require_number, require_numbers
+from etendue.quantities.arguments import as_numbers, require, require_number, require_numbers
 from etendue.quantities.bsdf_directions import direction, light_from
 from etendue.quantities.bsdf_slice import BsdfSlice
 
@@ -111,6 +112,7 @@ class DirectionalScan:
             raise ArgumentError(f"{len(arms) - len(rounded)} directions stand twice; give each once")
         if self.standard_error is not None and (self.standard_error < 0.0).any():
             raise ArgumentError("standard errors are not negative")
+        require(self.bench, (Bench, NoneType), "DirectionalScan: bench", "the `bench` of a ScatterGoniometer, or None")
         require_numbers(self, "incidence", "background")
         require_numbers(self, "solid_angle", none=True)
         if not 0.0 <= self.incidence < 90.0:
@@ -207,7 +209,7 @@ class DirectionalScan:
         """Detail of width `cell` [°] and distance of the farthest position, in direction cosines."""
         require_number(cell, "DirectionalScan.extent: cell", "an angle in °")
         off = self.direction[:, :2] - self.regular[:2]
-        fine = np.radians(cell) * abs(float(self.regular[2]))
+        fine = np.radians(float(cell)) * abs(float(self.regular[2]))
         return {"cell": float(fine), "farthest": float(np.hypot(*off.T).max())}
 
     def slice(self) -> BsdfSlice:

@@ -395,7 +395,7 @@ class ScatterGoniometer:
             head=self._head,
             counter=self._counter,
             wavelength=self.wavelength,
-            bsdf=TurnedSample(bsdf, turn) if turn else bsdf,
+            bsdf=TurnedSample(bsdf, float(turn)) if turn else bsdf,
             theta=theta,
             rays=rays,
             seed=seed,

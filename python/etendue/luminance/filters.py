@@ -123,7 +123,7 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     'selective 3×3, γ = 0.2: intensity 0.001336 → 0.00133 cd (−0.47 %); dead pixels 1 → 1'
     """
     check_luminance_map(lmap, "filter_map")
-    if kind == "opt":
+    if isinstance(kind, str) and kind == "opt":
         raise ArgumentError("filter_map: 'opt' is the denoiser, which needs no setting; call et.denoise_map(lmap).")
     require_known(kind, FILTERS, "filter")
     chosen = FILTERS[kind]

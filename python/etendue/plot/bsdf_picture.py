@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, get_args, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError
 from etendue.plot import style
 from etendue.plot.map_picture import draw_slim_bar
-from etendue.quantities.arguments import require, require_number
+from etendue.quantities.arguments import BSDF, require, require_known, require_number
 from etendue.quantities.bsdf_directions import direction
 from etendue.quantities.polar_grid import PolarGrid
 from etendue.scatter.bsdf import Bsdf, Side
@@ -125,7 +125,8 @@ def plot_bsdf(
     >>> len(plot_bsdf(Gaussian(peak=5, sigma=0.15)).axes)
     5
     """
-    require(bsdf, Bsdf, "plot_bsdf: bsdf", "a Bsdf: a model of et.bsdf, or of a file et.read_bsdf(path)")
+    require(bsdf, Bsdf, "plot_bsdf: bsdf", BSDF)
+    require_known(side, get_args(Side), "side")
     require_number(incidence, "plot_bsdf: incidence", "an angle from 0 to below 90°")
     if not 0.0 <= incidence < 90.0:
         raise ArgumentError(f"incidence is {incidence!r}; give an angle from 0 to below 90°.")

@@ -217,7 +217,7 @@ class Intensity(InNotebook):
 
     def between_planes(self, c: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array]:
         """The planes before and after each C, and how far it is on the way to the latter, 0 to 1."""
-        turned = np.mod(c, 360.0)
+        turned = np.mod(_finite("C", c), 360.0)
         first = (np.searchsorted(self.c, turned, side="right") - 1) % self.c.size
         second = (first + 1) % self.c.size
         gap = gaps_of(self.c)[first]
@@ -292,6 +292,8 @@ class Intensity(InNotebook):
         >>> Intensity([0], [0, 40, 90], [[500.0, 100, 0]], 20.0).largest_between(20, 90)
         Unlifted(value=300.0, error=20.0)
         """
+        require_number(low, "Intensity.largest_between: low", "an angle in °")
+        require_number(high, "Intensity.largest_between: high", "an angle in °")
         if not low <= high:
             raise ArgumentError(
                 f"Intensity: γ from {low:g}° to {high:g}°; the first angle must not be above the second."
@@ -334,6 +336,7 @@ class Intensity(InNotebook):
         {"none", "C0-C180", "C90-C270", "both", "rotational"}
             The plane(s) about which it is its own mirror image; ``"rotational"`` if it does not depend on C.
         """
+        require_number(tolerance, "Intensity.symmetry: tolerance", "a share of the maximum")
         limit = tolerance * float(np.abs(self.values).max())
         if float(np.ptp(self.values, axis=0).max()) <= limit:
             return "rotational"
@@ -393,7 +396,8 @@ class Intensity(InNotebook):
         ArgumentError
             If the factor is negative or not finite.
         """
-        if not (np.isfinite(factor) and factor >= 0.0):
+        require_number(factor, "Intensity.scaled: factor", "a finite factor ≥ 0")
+        if not 0.0 <= factor < math.inf:
             raise ArgumentError(f"Intensity: cannot be scaled by {factor}; give a finite factor ≥ 0.")
         provenance = self.provenance.then(f"intensity times {factor:.9g}")
         return self.replace(

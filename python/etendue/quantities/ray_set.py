@@ -77,7 +77,9 @@ class RaySet(RayRecords, InNotebook):
         require(spectra, Sequence, "RaySet: spectra", "a sequence of et.Spectrum")
         for one in spectra:
             require(one, Spectrum, "RaySet: one of the spectra", "an et.Spectrum(wavelength, weight)")
-        meaning = RaySetMeaning(flux_unit=flux_unit, spectra=tuple(spectra), provenance=provenance or Provenance())
+        meaning = RaySetMeaning(
+            flux_unit=flux_unit, spectra=tuple(spectra), provenance=Provenance() if provenance is None else provenance
+        )
         self._adopt(records, meaning)
 
     _colours: ray_colours.Colours | None = None

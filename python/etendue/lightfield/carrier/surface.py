@@ -50,7 +50,7 @@ class Surface(abc.ABC):
             value = getattr(self, field.name)
             if isinstance(value, bool) or value is None or isinstance(field.default, str):
                 continue
-            several = isinstance(value, Iterable) and not isinstance(value, str)
+            several = isinstance(value, Iterable) and not isinstance(value, str | bytes)
             for one in value if several else (value,):
                 require_number(one, f"{type(self).__name__}: {field.name}", "numbers" if several else "a number")
             # Whatever numbers came in, floats are compared, printed and saved.
