@@ -22,7 +22,7 @@ ABSURD: dict[str, tuple[str, tuple[object, ...]]] = {
         "--rays-per-pixel is",
         ("luminance", "lamp.toml", "--pixels", "2,2", "--rays-per-pixel", 10**12, "-o", "a.npz"),
     ),
-    "planes": ("1,000,000,000 cells", ("intensity", "led.tm25ray", "--c-planes", 10**9, "-o", "a.ies")),
+    "planes": ("--c-planes is 1000000000", ("intensity", "led.tm25ray", "--c-planes", 10**9, "-o", "a.ies")),
     "steps": ("180,000,001 cells", ("intensity", "led.tm25ray", "--gamma-step", "1e-6", "-o", "a.ies")),
     "rows": ('"desk": rows: is 1000000000', ("trace", "rows.toml", "--rays", 1000)),
     "rays": ("rays is 1000000000000000000", ("trace", "lamp.toml", "--rays", "1e18")),
