@@ -77,20 +77,43 @@ def ball_centre(position: FloatArray, direction: FloatArray, start: FloatArray, 
     True
     """
 
-    def feet(some: npt.NDArray[np.intp]) -> FloatArray:
-        x, k = position[some] - centre, direction[some]
-        foot: FloatArray = x - np.einsum("ij,ij->i", x, k)[:, None] * k
-        return foot
-
     centre = start
     everyone = np.arange(len(position))
     few = np.random.default_rng(seed).permutation(everyone)[:LINES]
     for _ in range(2):
+        lines = _Lines(position[few], direction[few])
         for step in range(2, STEPS + 2):
-            foot = feet(few)
-            centre = centre + foot[np.argmax(np.einsum("ij,ij->i", foot, foot))] / step
-        few = np.argsort(np.linalg.norm(feet(everyone), axis=1))[-LINES:]
+            farthest = int(np.argmax(lines.squared_distances(centre)))
+            centre = centre + lines.foot(farthest, centre) / step
+        few = np.argsort(_Lines(position, direction).squared_distances(centre))[-LINES:]
     return centre
+
+
+class _Lines:
+    """Lines that are asked many times how far from a point they pass: coordinate by coordinate, in memory of their own."""
+
+    def __init__(self, position: FloatArray, direction: FloatArray) -> None:
+        self.position, self.direction = (np.ascontiguousarray(values.T) for values in (position, direction))
+        self.offset = np.zeros_like(self.position)
+        self.along, self.product = np.zeros((2, len(position)))
+
+    def squared_distances(self, point: FloatArray) -> FloatArray:
+        """Of the feet of the perpendiculars from a point."""
+        np.subtract(self.position, point[:, None], out=self.offset)
+        self.along[:] = 0.0
+        for offset, direction in zip(self.offset, self.direction, strict=True):
+            self.along += np.multiply(offset, direction, out=self.product)
+        squared = np.zeros_like(self.along)
+        for offset, direction in zip(self.offset, self.direction, strict=True):
+            offset -= np.multiply(self.along, direction, out=self.product)
+            squared += np.multiply(offset, offset, out=self.product)
+        return squared
+
+    def foot(self, line: int, point: FloatArray) -> FloatArray:
+        """From a point to the foot of the perpendicular on a line."""
+        x, k = self.position[:, line] - point, self.direction[:, line]
+        foot: FloatArray = x - (x @ k) * k
+        return foot
 
 
 def start_centre(position: FloatArray) -> FloatArray | None:
