@@ -76,7 +76,6 @@ def ball_centre(position: FloatArray, direction: FloatArray, start: FloatArray, 
     >>> bool(np.abs(ball_centre(rim + [5, 0, 1], along, np.zeros(3), 1) - [5, 0, 1]).max() < 0.02)
     True
     """
-
     centre = start
     everyone = np.arange(len(position))
     few = np.random.default_rng(seed).permutation(everyone)[:LINES]
@@ -105,8 +104,8 @@ class _Lines:
             self.along += np.multiply(offset, direction, out=self.product)
         squared = np.zeros_like(self.along)
         for offset, direction in zip(self.offset, self.direction, strict=True):
-            offset -= np.multiply(self.along, direction, out=self.product)
-            squared += np.multiply(offset, offset, out=self.product)
+            across = np.subtract(offset, np.multiply(self.along, direction, out=self.product), out=self.product)
+            squared += np.multiply(across, across, out=self.product)
         return squared
 
     def foot(self, line: int, point: FloatArray) -> FloatArray:
