@@ -145,6 +145,7 @@ def test_saturated_pixels_are_those_that_even_the_shortest_exposure_cannot_hold(
     assert merged[3] == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "surface",
     [

@@ -406,6 +406,7 @@ def test_transmitted_light_is_the_mirror_image_of_reflected_light(tmp_path: Path
         Scans([[0, 0, 1]], [[0, 0, 1]], [0.1], transmittance=1.2)  # type: ignore[arg-type,list-item] # made arrays
 
 
+@pytest.mark.slow
 def test_a_diffuser_from_scans_behind_it() -> None:
     """A holographic diffuser of 20°, scanned in six planes at four incidences: f and T are its own."""
     diffuser = MATERIALS["holographic-diffuser-20"].finish
