@@ -1,4 +1,4 @@
-//! The cone estimator of [Audenaert2014] chapter 2.
+//! The cone estimator of `[Audenaert2014]` chapter 2.
 //!
 //! A ray belongs to pixel p if its line crosses p, and it is seen if the angle between its direction and the line from
 //! p's centre to the observer is below the acceptance α (eq. 2.2). The sum of the seen flux per pixel, divided by solid

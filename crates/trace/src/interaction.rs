@@ -118,7 +118,7 @@ pub fn interaction_of(
     }
 }
 
-/// One face met alone: what [`resolve`] comes to then, without its lists.
+/// One face met alone: what [`decide_together`] comes to then, without its lists.
 #[inline(always)]
 fn single_face(
     scene: &Scene,

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use etendue_math::Vec3;
 use etendue_math::trig::sin_cos_turns;
 
-use super::contract::{Bsdf, Facts, Media, Parameters, Shares};
+use super::contract::{Bsdf, Facts, Media, Parameters};
+use super::shares::Shares;
 use crate::table::Table;
 
 /// f = ρ (n + 2)/(2π) (cos θᵢ cos θₛ)ⁿ: of light along the normal the share ρ is reflected, of other light ρ cosⁿθᵢ. n = 0 is
@@ -85,14 +86,10 @@ impl Bsdf for Minnaert {
         let (s, c) = sin_cos_turns(turn);
         Vec3::new(sine * c, sine * s, cosine.copysign(incident.z))
     }
-
-    fn incoming(&self, scattered: Vec3, media: &Media) -> [f64; 2] {
-        [self.share(scattered.z, media), 0.0]
-    }
 }
 
 #[cfg(test)]
-impl super::contract::Examples for Minnaert {
+impl super::examples::Examples for Minnaert {
     fn examples() -> Vec<Self> {
         let coloured = Table::new(vec![0.0], vec![450.0, 700.0], vec![0.2, 0.9]).expect("sound");
         [

@@ -15,8 +15,10 @@
 //!
 //! **Backwards.** Who follows light from the eye knows where it goes and asks where it came from.
 //! [`seen`](Bsdf::seen) says how much of the radiance behind a mirrored or refracted line of sight is seen;
-//! [`incoming`](Bsdf::incoming), [`draw_incoming`](Bsdf::draw_incoming) and [`incoming_pdf`](Bsdf::incoming_pdf) propose
-//! directions that diffuse light may come from. Whoever takes one weighs it by f |cos θᵢ| over its density.
+//! [`outward`](Bsdf::outward) prepares what is asked about light that leaves one way, [`draw_incoming`](Bsdf::draw_incoming)
+//! proposes directions that it may have come from, [`drawn_light`](Bsdf::drawn_light) has their density, and
+//! [`incoming_light`](Bsdf::incoming_light) answers for other directions. Whoever takes one weighs it by f |cos θᵢ| over its
+//! density.
 //!
 //! **Taken apart.** Many BSDFs have a part f = a(incident) l(scattered)/π: Lambertian light, that under a clear coat, the base of
 //! a table. What it sends out anywhere is known as soon as the light that arrives is summed with the weights a, wherever it came

@@ -1,4 +1,4 @@
-//! Concentric Lambertian rings in the plane z = 0: the test source of [Audenaert2014] section 2.3.
+//! Concentric Lambertian rings in the plane z = 0: the test source of `[Audenaert2014]` section 2.3.
 
 use std::ops::Range;
 

@@ -1,6 +1,6 @@
 //! Interfaces of solids that many branches meet at once: each of them goes on mirrored and refracted, or on one of both ways.
 //!
-//! What `interaction` and [`PathBlock::surface`] come to there, without branches and several lines at a time.
+//! What `interaction` and the surface event of `step` come to there, without branches and several lines at a time.
 
 use etendue_geometry::hits::Hits;
 use etendue_geometry::origin_faces::NONE;
