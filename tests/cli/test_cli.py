@@ -222,7 +222,7 @@ def test_wrong_usage_ends_with_status_2(run: Run, folder: Path, arguments: list[
         (["convert", "{}/nothere.ray", "x.dat"], "nothere.ray: No such file"),
         (["convert", "{}/led.tm25ray", "x.ray"], "belongs to several formats"),
         (["convert", "{}/led.tm25ray", "x.xyz"], "belongs to no ray format"),
-        (["convert", "{}/led.tm25ray", "x.dat", "--subset", "0"], "subset: 0 rays"),
+        (["convert", "{}/led.tm25ray", "x.dat", "--subset", "0"], "subset: the number of rays is 0"),
         (["convert", "{}/led.tm25ray", "x.dat", "--subset", "60001"], "60001 rays of 60,000"),
         (["convert", "{}/led.tm25ray", "x.dat", "--subset", "5", "--seed", "-1"], "seed -1"),
         (["convert", "{}/led.tm25ray", "x.dat", "--unit", "W"], "no spectrum"),
@@ -247,7 +247,7 @@ def test_wrong_usage_ends_with_status_2(run: Run, folder: Path, arguments: list[
             "this is a ray file (IES TM-25 ray file), no map",
         ),
         (["compare", "{}/nothere.npz", "{}/nothere.npz"], "No such file"),
-        (["demo", "--seed", "-1", "-o", "d.png"], "seed -1"),
+        (["demo", "--seed", "-1", "-o", "d.png"], "--seed is -1"),
         (["demo", "-o", "d.exe"], ".png"),
     ],
 )

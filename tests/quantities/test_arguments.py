@@ -165,7 +165,7 @@ CALLS: dict[str, tuple[Callable[[Any], object], tuple[Any, ...]]] = {
     "RingSource: radii ": (et.RingSource, (*NO_ARRAYS, 30.0)),
     "RingSource: flux ": (lambda wrong: et.RingSource(flux=wrong), (*NO_ARRAYS, 100.0)),
     **{
-        f"RingSource: {name} ": (lambda wrong, name=name: et.RingSource(**{name: wrong}), (*NO_NUMBERS, 1e6))
+        f"RingSource: {name} ": (lambda wrong, name=name: et.RingSource(**{name: wrong}), (*NO_NUMBERS, 1.5))
         for name in ("rays", "runs", "seed")
     },
     "Observer: target ": (lambda wrong: et.Observer(0, 0, 1000, target=wrong), NO_POINTS),
@@ -213,7 +213,10 @@ CALLS: dict[str, tuple[Callable[[Any], object], tuple[Any, ...]]] = {
     ),
     "total flux is": (lambda wrong: et.RingSource(rays=10).ray_set().with_total_flux(wrong), NO_NUMBERS),
     "scale factor is": (lambda wrong: et.RingSource(rays=10).ray_set().scaled(wrong), NO_NUMBERS),
-    "subset: n is": (lambda wrong: et.RingSource(rays=10).ray_set().subset(wrong, 1), (*NO_NUMBERS, 1e6)),
+    "subset: the number of rays is": (
+        lambda wrong: et.RingSource(rays=10).ray_set().subset(wrong, 1),
+        (*NO_NUMBERS, 1.5),
+    ),
     "merge: sets": (et.RaySet.merge, (None, 3, LMAP)),
     "merge: one of the sets": (et.RaySet.merge, (["a.tm25ray"], "a.tm25ray", [LMAP])),
     "bsdf is": (et.ScatterGoniometer().measure, ("paint.bsdf", None, LMAP)),
@@ -282,7 +285,7 @@ CALLS: dict[str, tuple[Callable[[Any], object], tuple[Any, ...]]] = {
     "wavelength is": (lambda wrong: PAINT.reflectance(10.0, wavelength=wrong), NO_NUMBERS),
     "media is": (lambda wrong: PAINT.reflectance(10.0, media=wrong), (*NO_ARRAYS, 1.5, [1.0], [1.0, 0.0])),
     "unknown side": (lambda wrong: PAINT.known_to(side=wrong), NO_NAMES),
-    "n is": (lambda wrong: PAINT.sample(UP, wrong), (*NO_NUMBERS, -1, 1e6, True)),
+    "n is": (lambda wrong: PAINT.sample(UP, wrong), (*NO_NUMBERS, -1, 1.5, True)),
     # --- instruments ------------------------------------------------------------------------------------------------------
     "unknown operator": (lambda wrong: et.deconvolve(SCAN, SCAN, operator=wrong), NO_NAMES),
     "unknown method": (lambda wrong: et.deconvolve(SCAN, SCAN, method=wrong), NAMES_GIVEN),
@@ -303,7 +306,7 @@ CALLS: dict[str, tuple[Callable[[Any], object], tuple[Any, ...]]] = {
     "Baffle.field: aperture ": (lambda wrong: et.Baffle(24, 200).field(wrong, 500.0), NO_NUMBERS),
     "Baffle.field: distance ": (lambda wrong: et.Baffle(24, 200).field(25.0, wrong), NO_NUMBERS),
     "Baffle.etendue: aperture ": (et.Baffle(24, 200).etendue, (*NO_NUMBERS, 0, np.nan, np.inf)),
-    "rays is": (lambda wrong: et.ScatterGoniometer().measure(PAINT, rays=wrong), (*NO_NUMBERS, 0, 1e6, 10**30)),
+    "rays is": (lambda wrong: et.ScatterGoniometer().measure(PAINT, rays=wrong), (*NO_NUMBERS, 0, 1.5, 10**30)),
     "span is": (lambda wrong: et.ScatterGoniometer().instrument_function(span=wrong), ("6", [6.0], LMAP)),
     "turn is": (lambda wrong: et.ScatterGoniometer().measure_window(PAINT, turn=wrong), NO_NUMBERS),
     "the step over a hemisphere is": (
@@ -324,7 +327,7 @@ CALLS: dict[str, tuple[Callable[[Any], object], tuple[Any, ...]]] = {
         lambda wrong: et.LightField.fit(RINGS, DISK, depths=wrong),
         ("2222", 2, (2, 2), (2, 2, 2, 2.5), (2, 2, 2, -1), (2, 2, 2, 17), [[2, 2], [2, 2]], [[2], [2, 2]], {}, LMAP),
     ),
-    "FieldRays: the number of rays is": (lambda wrong: field().rays(wrong), (*NO_NUMBERS, 0, 1e6)),
+    "FieldRays: the number of rays is": (lambda wrong: field().rays(wrong), (*NO_NUMBERS, 0, 1.5)),
     "points is": (lambda wrong: field().luminance(wrong, [UP]), NO_ARRAYS),
     "directions is": (lambda wrong: field().pdf([UP], wrong), NO_ARRAYS),
     "c_planes is": (lambda wrong: field().intensity(wrong, 30.0), ("4", [4], 1.5, 0, LMAP)),
@@ -335,7 +338,7 @@ CALLS: dict[str, tuple[Callable[[Any], object], tuple[Any, ...]]] = {
         (None, 30, "30", (), (30, 90, 1), np.eye(2), (31, 90), LMAP),
     ),
     "place of the lattice": (lambda wrong: et.GriddedSource.fit(RINGS, DISK, centre_on=wrong), NO_NAMES),
-    "sample: n ": (lambda wrong: patches().sample(wrong, 1), (*NO_NUMBERS, 0, 1e6, 10**30)),
+    "sample: n ": (lambda wrong: patches().sample(wrong, 1), (*NO_NUMBERS, 0, 1.5, 10**30)),
     "flux is ": (lambda wrong: patches().emitting(wrong), (*NO_NUMBERS, 0.0, np.nan)),
     "luminance: points": (lambda wrong: patches().luminance(wrong, [UP]), NO_ARRAYS),
     "folder is": (et.GriddedSource.load, (None, 3, LMAP)),
@@ -440,6 +443,26 @@ def test_numbers_of_numpy_are_numbers() -> None:
     assert et.Disk(radius=np.int64(3)) == et.Disk(radius=3)
     assert et.Observer(np.float64(30.0), 0, np.int32(1000)) == et.Observer(30, 0, 1000)
     assert et.cross_section(LMAP, x=np.float64(1.0)).values.tolist() == VALUES[::-1, 2].tolist()
+
+
+COUNTS: dict[str, Callable[[Any], object]] = {
+    "rings": lambda n: et.RingSource(rays=n, seed=3).ray_set().flux,
+    "subset": lambda n: et.RingSource(rays=200).ray_set().subset(n, 1).direction,
+    "field": lambda n: field().sample(n).direction,
+    "patches": lambda n: patches().sample(n, 1).direction,
+    "BSDF": lambda n: PAINT.sample(UP, n),
+    "trace": lambda n: et.trace(LAMP, rays=n).ledger.emitted,
+    "near field": lambda n: run().ray_set(n).direction,
+    "lines of sight": lambda n: et.PathTracing(rays_per_pixel=n).rays_per_pixel,
+    "points": lambda n: et.FromField(samples=n).samples,
+}
+
+
+@pytest.mark.parametrize("door", COUNTS)
+def test_counts_may_be_powers_of_ten(door: str) -> None:
+    """1e2 and 100 are the same number of rays wherever rays are counted."""
+    count = COUNTS[door]
+    np.testing.assert_array_equal(count(1e2), count(100))  # NaN where a ray is absorbed
 
 
 def test_one_percentile_is_one() -> None:

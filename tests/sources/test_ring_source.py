@@ -300,11 +300,11 @@ def test_an_observer_who_is_not_above_the_plane_is_refused(observer: Observer) -
         ({"flux": (1.0, 2.0)}, "for each of 3 rings"),
         ({"flux": (1.0, 2.0, 0.0)}, "finite flux > 0"),
         ({"flux": (1.0, 2.0, math.nan)}, "finite flux > 0"),
-        ({"rays": 0}, "at least one"),
-        ({"runs": 0}, "at least one"),
+        ({"rays": 0}, "rays is 0"),
+        ({"runs": 0}, "runs is 0"),
         ({"rays": 2**62, "runs": 2}, "fewer than 2^63"),
         ({"rays": 2}, "leave a ring without any"),
-        ({"seed": -1}, "seed -1"),
+        ({"seed": -1}, "seed is -1"),
         ({"seed": 2**64}, "seed"),
     ],
 )
@@ -314,10 +314,13 @@ def test_refuses_a_source_outside_the_domain(arguments: dict[str, Any], message:
 
 
 @pytest.mark.parametrize("name", ["rays", "runs", "seed"])
-def test_counts_are_integers_of_any_type(name: str) -> None:
-    with pytest.raises(ArgumentError, match=f"RingSource: {name} is 1000000.0; give a whole number"):
-        RingSource(**{name: 1e6})  # type: ignore[arg-type]
-    assert len(RingSource(**({"rays": 500} | {name: np.uint16(500)}))) == (250_000 if name == "runs" else 500)
+@pytest.mark.parametrize("number", [np.uint16(500), 5e2, np.float32(500)], ids=lambda n: type(n).__name__)
+def test_counts_are_whole_numbers_of_any_type(name: str, number: Any) -> None:
+    with pytest.raises(ArgumentError, match=f"RingSource: {name} is 500.5; give a whole number"):
+        RingSource(**{name: 500.5})  # type: ignore[arg-type]
+    source = RingSource(**({"rays": 500} | {name: number}))
+    assert len(source) == (250_000 if name == "runs" else 500)
+    assert source.ray_set().flux.tolist() == RingSource(**({"rays": 500} | {name: 500})).ray_set().flux.tolist()
 
 
 def test_the_longest_source_is_read_at_its_end() -> None:

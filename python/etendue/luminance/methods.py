@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, Self, get_args
 from etendue.description.values import is_number
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.lightfield.carrier import Surface
+from etendue.quantities.arguments import as_whole
 from etendue.quantities.ray_stream import checked_seed
 
 MOST_SAMPLES = 2048
@@ -153,11 +154,7 @@ class FromField(Method):
         surface: Any = self.surface
         if not (isinstance(surface, Surface) or (isinstance(surface, str) and surface == "auto")):
             raise ArgumentError(f"surface is {surface!r}; give a Surface, or 'auto'. For text there is parse_surface.")
-        samples: Any = self.samples
-        if isinstance(samples, bool) or not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
-            raise ArgumentError(
-                f"samples is {samples!r}; give a whole number of points per pixel, 1 to {MOST_SAMPLES}."
-            )
+        object.__setattr__(self, "samples", as_whole(self.samples, "samples", 1, MOST_SAMPLES))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -220,9 +217,8 @@ class PathTracing(Method):
     SOURCES: ClassVar[str] = "scenes and scatter events"
 
     def __post_init__(self) -> None:
-        n: Any = self.rays_per_pixel
-        if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MOST_RAYS_PER_PIXEL:
-            raise ArgumentError(f"rays_per_pixel is {n!r}; give a whole number from 1 to {MOST_RAYS_PER_PIXEL:,}.")
+        lines = as_whole(self.rays_per_pixel, "rays_per_pixel", 1, MOST_RAYS_PER_PIXEL)
+        object.__setattr__(self, "rays_per_pixel", lines)
         least: Any = self.until
         if least is not None and not (is_number(least) and 0.0 < float(least) < math.inf):
             raise ArgumentError(f"until is {self.until!r}; give the relative error to be reached, e.g. 0.01.")

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.plot.scene_parts import Glow, Part, View, finish_kind, within
-from etendue.quantities.arguments import SCENE, as_numbers, require
+from etendue.quantities.arguments import SCENE, as_numbers, as_whole, require
 from etendue.scene import MEDIA, Compiled, Medium, Scene, compile_scene
 from etendue.scene.extents import box_of
 from etendue.tracing.section import Section
@@ -143,8 +143,7 @@ def lay_out_scene(
     planes = [Section.parse(text) for text in ([section] if isinstance(section, str) else section)]
     if not 1 <= len(planes) <= MOST_SECTIONS:
         raise ArgumentError(f"draw_scene: {len(planes)} sections; give 1 to {MOST_SECTIONS}.")
-    if isinstance(rays, bool) or not (isinstance(rays, int) and 0 <= rays <= MOST_TRAILS):
-        raise ArgumentError(f"draw_scene: rays is {rays!r}; give a whole number from 0 to {MOST_TRAILS:,}.")
+    rays = as_whole(rays, "draw_scene: rays", 0, MOST_TRAILS)
     if isinstance(seed, bool) or not (isinstance(seed, int) and 0 <= seed < 1 << 64):
         raise ArgumentError(f"draw_scene: seed is {seed!r}; give a whole number from 0 to 2⁶⁴ − 1.")
     frame = None if window is None else _checked(window)

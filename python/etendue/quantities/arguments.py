@@ -169,11 +169,11 @@ def require_number(given: Any, what: str, instead: str = "a number") -> None:
 
 
 def as_whole(given: Any, what: str, least: int = 0, most: int = (1 << 64) - 1) -> int:
-    """A whole number of a range, as Python's own; True and False are none.
+    """A whole number of a range, as Python's own; True and False are none, 1e6 is one.
 
     Parameters
     ----------
-    given : int
+    given : int or float
         The argument; scalars of numpy are numbers.
     what : str
         Function and argument.
@@ -187,14 +187,15 @@ def as_whole(given: Any, what: str, least: int = 0, most: int = (1 << 64) - 1) -
 
     Examples
     --------
-    >>> as_whole(3, "sample: n", 1)
-    3
-    >>> as_whole(3.0, "sample: n", 1, 100)
+    >>> as_whole(1e3, "sample: n", 1)
+    1000
+    >>> as_whole(3.5, "sample: n", 1, 100)
     Traceback (most recent call last):
-    etendue.errors.ArgumentError: sample: n is 3.0; give a whole number from 1 to 100.
+    etendue.errors.ArgumentError: sample: n is 3.5; give a whole number from 1 to 100.
     """
-    whole = isinstance(given, numbers.Integral) and not isinstance(given, bool)
-    if not (whole and least <= given <= most):
+    number = isinstance(given, numbers.Real) and not isinstance(given, bool)
+    # In this order: infinity and NaN have no int.
+    if not (number and least <= given <= most and int(given) == given):
         told = f"{most:,}" if most < 1 << 40 else "2" + str((most + 1).bit_length() - 1).translate(RAISED) + " − 1"
         raise ArgumentError(f"{what} is {described(given)}; give a whole number from {least:,} to {told}.")
     return int(given)

@@ -12,7 +12,7 @@ import numpy as np
 
 from etendue import _core
 from etendue.errors import ArgumentError, UnitError
-from etendue.quantities.arguments import as_numbers, require, require_known, require_number
+from etendue.quantities.arguments import as_numbers, as_whole, require, require_known, require_number
 from etendue.quantities.ray_records import FLUX_COLUMNS, RayRecords
 from etendue.quantities.ray_rewriting import CHUNK, Rays, Records, transformed, with_records, without
 from etendue.quantities.ray_stream import FloatArray
@@ -44,9 +44,7 @@ class VirtualFocus:
 def subset(rays: Rays, n: int, seed: int) -> Rays:
     """`n` rays drawn at random without replacement, in file order, rescaled to the total flux of the whole set."""
     total = len(rays)
-    require(n, numbers.Integral, "subset: n", "a whole number of rays")
-    if not 1 <= n <= total:
-        raise ArgumentError(f"subset: {n} rays of {total:,}; ask for 1 to {total:,}.")
+    n = as_whole(n, "subset: the number of rays", 1, total)
     _check_seed(seed)
 
     def parts() -> Iterator[Records]:
@@ -67,9 +65,7 @@ def subset(rays: Rays, n: int, seed: int) -> Rays:
 
 def thin(rays: Rays, parts: int, seed: int) -> tuple[Rays, ...]:
     """Deal the rays at random into independent parts, each scaled by `parts` to stand for the whole."""
-    require(parts, numbers.Integral, "thin: parts", "a whole number, 2 or more")
-    if not 2 <= parts < 2**32:
-        raise ArgumentError(f"thin: {parts} parts; ask for 2 to 4294967295.")
+    parts = as_whole(parts, "thin: parts", 2, (1 << 32) - 1)
     _check_seed(seed)
     scale = rays.flux_scale * parts
 

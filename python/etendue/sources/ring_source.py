@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import numbers
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
@@ -99,16 +98,10 @@ class RingSource(DrawnRays):
             raise ArgumentError(
                 f"RingSource: flux {flux} lm; give one finite flux > 0 for each of {len(edges) - 1} rings."
             )
-        # Not 1e6, which would become a share of rays with a fraction.
-        for name, given in (("rays", rays), ("runs", runs), ("seed", seed)):
-            require(given, numbers.Integral, f"RingSource: {name}", "a whole number, without a point or an exponent")
-        rays, runs, seed = int(rays), int(runs), int(seed)
-        if rays < 1 or runs < 1 or rays * runs >= 2**63:
-            raise ArgumentError(
-                f"RingSource: {rays} rays in {runs} runs; give at least one, and fewer than 2^63 in all."
-            )
-        if not 0 <= seed < 2**64:
-            raise ArgumentError(f"RingSource: seed {seed}; give 0 to 2^64 - 1.")
+        rays = as_whole(rays, "RingSource: rays", 1)
+        runs, seed = as_whole(runs, "RingSource: runs", 1), as_whole(seed, "RingSource: seed")
+        if rays * runs >= 2**63:
+            raise ArgumentError(f"RingSource: {rays} rays in {runs} runs; give fewer than 2^63 in all.")
         self.edges = edges
         self.ring_flux = flux
         self.runs = runs
