@@ -223,7 +223,7 @@ def test_wrong_usage_ends_with_status_2(run: Run, folder: Path, arguments: list[
         (["convert", "{}/led.tm25ray", "x.ray"], "belongs to several formats"),
         (["convert", "{}/led.tm25ray", "x.xyz"], "belongs to no ray format"),
         (["convert", "{}/led.tm25ray", "x.dat", "--subset", "0"], "subset: the number of rays is 0"),
-        (["convert", "{}/led.tm25ray", "x.dat", "--subset", "60001"], "60001 rays of 60,000"),
+        (["convert", "{}/led.tm25ray", "x.dat", "--subset", "60001"], "is 60001; give a whole number from 1 to 60,000"),
         (["convert", "{}/led.tm25ray", "x.dat", "--subset", "5", "--seed", "-1"], "seed -1"),
         (["convert", "{}/led.tm25ray", "x.dat", "--unit", "W"], "no spectrum"),
         (["convert", "{}/led.tm25ray", "x.dat", "--flux", "0"], "finite flux > 0"),
