@@ -308,10 +308,10 @@ def test_numbers_out_of_their_domain(field: LightField, n: int, seed: int) -> No
 
 
 def test_numbers_that_are_no_integers(field: LightField) -> None:
-    for n, seed in ((1e6, 1), (10, 1.5), ("10", 1)):
+    for n, seed in ((1e6 + 0.5, 1), (10, 1.5), ("10", 1)):
         with pytest.raises(ArgumentError, match="give a whole number from"):
             field.rays(n, seed=seed)  # type: ignore[arg-type]
-    assert len(field.rays(np.int64(5), seed=np.uint64(3))) == 5
+    assert len(field.rays(np.int64(5), seed=np.uint64(3))) == len(field.rays(5.0, 3)) == 5  # type: ignore[arg-type]
 
 
 # --- streams -----------------------------------------------------------------------------------------------------------

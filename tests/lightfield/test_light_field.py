@@ -277,7 +277,7 @@ def test_what_makes_no_sense_is_refused(film: tuple[PrismaticFilm, et.RaySet, Li
         et.luminance_map(field, observer, screen, method="cone")
     with pytest.raises(ArgumentError, match="acceptance: FromField has no such option"):
         et.luminance_map(rays, observer, screen, method="lightfield", acceptance=2.0)
-    with pytest.raises(ArgumentError, match="points per pixel"):
+    with pytest.raises(ArgumentError, match="samples is 0; give a whole number"):
         et.luminance_map(field, observer, screen, samples=0)
     with pytest.raises(ArgumentError, match="shape"):
         field.luminance(points=[[0, 0, 0]], directions=[[0, 0, 1], [0, 0, 1]])

@@ -12,11 +12,14 @@ use super::tube::Tube;
 
 /// The shape of a part in its frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs, reason = "each is described where it is defined")]
 pub enum Shape {
+    /// Flat, with corners.
     Rectangle(Rectangle),
+    /// Flat and round.
     Disk(Disk),
+    /// Half a sphere.
     Hemisphere(Hemisphere),
+    /// The side of a cylinder.
     Tube(Tube),
 }
 
