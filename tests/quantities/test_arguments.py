@@ -451,10 +451,10 @@ COUNTS: dict[str, Callable[[Any], object]] = {
     "field": lambda n: field().sample(n).direction,
     "patches": lambda n: patches().sample(n, 1).direction,
     "BSDF": lambda n: PAINT.sample(UP, n),
-    "trace": lambda n: et.trace(LAMP, rays=n).ledger.emitted,
+    "trace": lambda n: str(et.trace(LAMP, rays=n).ledger),
     "near field": lambda n: run().ray_set(n).direction,
-    "lines of sight": lambda n: et.PathTracing(rays_per_pixel=n).rays_per_pixel,
-    "points": lambda n: et.FromField(samples=n).samples,
+    "lines of sight": lambda n: repr(et.PathTracing(rays_per_pixel=n)),
+    "points": lambda n: repr(et.FromField(samples=n)),
 }
 
 

@@ -9,6 +9,7 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.quantities.powers_of_ten import RAISED
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -32,8 +33,6 @@ SCANS = "Scans: of files et.read_scans(paths)"
 
 BSDF = "a BSDF: a model such as et.bsdf.Lambertian(reflectance=0.8), or of a file et.read_bsdf(path)"
 """What to give where a BSDF is wanted."""
-
-RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 MOST_LETTERS = 40
 """Of a text that is told."""

@@ -89,7 +89,13 @@ def ball_centre(position: FloatArray, direction: FloatArray, start: FloatArray, 
 
 
 class _Lines:
-    """Lines that are asked many times how far from a point they pass: coordinate by coordinate, in memory of their own."""
+    """Lines that are asked many times how far from a point they pass: coordinate by coordinate, in memory of their own.
+
+    Parameters
+    ----------
+    position, direction : array, shape (n, d)
+        Points of the lines [mm] and unit vectors along them.
+    """
 
     def __init__(self, position: FloatArray, direction: FloatArray) -> None:
         self.position, self.direction = (np.ascontiguousarray(values.T) for values in (position, direction))
@@ -97,7 +103,7 @@ class _Lines:
         self.along, self.product = np.zeros((2, len(position)))
 
     def squared_distances(self, point: FloatArray) -> FloatArray:
-        """Of the feet of the perpendiculars from a point."""
+        """Of the feet of the perpendiculars from a point [mm²], shape (n,)."""
         np.subtract(self.position, point[:, None], out=self.offset)
         self.along[:] = 0.0
         for offset, direction in zip(self.offset, self.direction, strict=True):
@@ -109,7 +115,7 @@ class _Lines:
         return squared
 
     def foot(self, line: int, point: FloatArray) -> FloatArray:
-        """From a point to the foot of the perpendicular on a line."""
+        """From a point to the foot of the perpendicular on a line [mm], shape (d,)."""
         x, k = self.position[:, line] - point, self.direction[:, line]
         foot: FloatArray = x - (x @ k) * k
         return foot
