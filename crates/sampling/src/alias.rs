@@ -77,7 +77,7 @@ impl Alias {
     #[inline]
     #[must_use]
     pub fn pick(&self, u: f64) -> usize {
-        self.pick_and_rest(u).0
+        pick_from(&self.slots, u).0
     }
 
     /// Its slots: a uniform number falls into one of them, and what is left of it decides.
@@ -90,34 +90,80 @@ impl Alias {
     /// The number of the slot that a uniform number in (0, 1) falls into, and the same with how far into it the number falls.
     #[inline]
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "below the number of slots, which is below 2^32"
-    )]
     pub fn place(&self, u: f64) -> (u32, f64) {
-        let scaled = u * self.slots.len() as f64;
-        let slot = (scaled as u32).min(self.slots.len() as u32 - 1);
-        (slot, scaled)
+        place_among(self.slots.len(), u)
     }
 
     /// The entry for a uniform number in (0, 1), and what is left of the number: uniform again, less than 1.
     #[inline]
     #[must_use]
     pub fn pick_and_rest(&self, u: f64) -> (usize, f64) {
-        let (slot, scaled) = self.place(u);
-        let within = scaled - f64::from(slot);
-        let slot = slot as usize;
-        let (chance, alias) = (self.slots[slot].chance(), self.slots[slot].alias);
-        // Without a branch: which of the two it is, nobody can foresee.
-        let own = within < chance;
-        let (part, share) = if own {
-            (within, chance)
-        } else {
-            (within - chance, 1.0 - chance)
-        };
-        (if own { slot } else { alias as usize }, part_of(part, share))
+        pick_from(&self.slots, u)
     }
+}
+
+/// Tables one after the other, in one piece of memory.
+#[derive(Clone, Debug)]
+pub struct Aliases {
+    slots: Vec<Slot>,
+    /// Where each table begins, and the last one ends.
+    starts: Vec<usize>,
+}
+
+impl Default for Aliases {
+    /// None yet.
+    fn default() -> Self {
+        Self {
+            slots: Vec::new(),
+            starts: vec![0],
+        }
+    }
+}
+
+impl Aliases {
+    /// One more table, over weights ≥ 0; without entries where [`Alias::new`] has none.
+    pub fn push(&mut self, weights: &[f64]) {
+        self.slots
+            .extend(Alias::new(weights).map(|table| table.slots).unwrap_or_default());
+        self.starts.push(self.slots.len());
+    }
+
+    /// The entry of a table for a uniform number in (0, 1); None if the table has no entries.
+    #[inline]
+    #[must_use]
+    pub fn pick(&self, table: usize, u: f64) -> Option<usize> {
+        let slots = &self.slots[self.starts[table]..self.starts[table + 1]];
+        (!slots.is_empty()).then(|| pick_from(slots, u).0)
+    }
+}
+
+/// The number of the slot of so many that a uniform number in (0, 1) falls into, and the same with how far into it the number falls.
+#[inline(always)]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "below the number of slots, which is below 2^32"
+)]
+fn place_among(slots: usize, u: f64) -> (u32, f64) {
+    let scaled = u * slots as f64;
+    ((scaled as u32).min(slots as u32 - 1), scaled)
+}
+
+/// The entry for a uniform number in (0, 1), and what is left of the number.
+#[inline(always)]
+fn pick_from(slots: &[Slot], u: f64) -> (usize, f64) {
+    let (slot, scaled) = place_among(slots.len(), u);
+    let within = scaled - f64::from(slot);
+    let slot = slot as usize;
+    let (chance, alias) = (slots[slot].chance(), slots[slot].alias);
+    // Without a branch: which of the two it is, nobody can foresee.
+    let own = within < chance;
+    let (part, share) = if own {
+        (within, chance)
+    } else {
+        (within - chance, 1.0 - chance)
+    };
+    (if own { slot } else { alias as usize }, part_of(part, share))
 }
 
 #[cfg(test)]
@@ -145,6 +191,19 @@ mod tests {
             }
             for k in 0..10_000 {
                 assert!(weights[table.pick((f64::from(k) + 0.5) / 10_000.0)] > 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn tables_in_a_row_are_those_of_each() {
+        let weights = [vec![1.0, 3.0, 0.5], vec![0.0, 0.0], vec![2.0], vec![0.0, 1.0, 4.0, 2.0]];
+        let mut row = Aliases::default();
+        weights.iter().for_each(|w| row.push(w));
+        for (table, weights) in weights.iter().enumerate() {
+            for k in 0..100 {
+                let u = (f64::from(k) + 0.5) / 100.0;
+                assert_eq!(row.pick(table, u), Alias::new(weights).map(|alone| alone.pick(u)));
             }
         }
     }

@@ -76,39 +76,101 @@ impl Sampler {
         &self.fluxes
     }
 
-    /// The part and the coordinates of ray `index`.
-    #[must_use]
-    pub fn draw(&self, stream: Stream, index: u64) -> (usize, [f64; 2], [f64; 2]) {
-        let (mut block, mut used, mut numbers) = (0, 4, [0.0; 4]);
-        let mut next = || {
-            if used == 4 {
-                (numbers, used, block) = (stream.uniforms(index, block), 0, block + 1);
+    /// Rays `first..` of a stream, as many as there is room for.
+    ///
+    /// Step by step for all of them: the tables are larger than the caches of a processor, and while it waits for an entry of one
+    /// ray, it asks for those of others.
+    ///
+    /// # Panics
+    /// If there is room for more than [`TOGETHER`].
+    pub fn draw(&self, stream: Stream, first: u64, rays: &mut [Drawn]) {
+        let parts = &self.field.parts;
+        let mut all_numbers: [_; TOGETHER] =
+            std::array::from_fn(|i| Numbers::new(stream, first.wrapping_add(i as u64)));
+        let (mut all_cells, mut all_hats) = ([[0; 4]; TOGETHER], [None; TOGETHER]);
+        let (numbers, cells, hats) = (
+            &mut all_numbers[..rays.len()],
+            &mut all_cells[..rays.len()],
+            &mut all_hats[..rays.len()],
+        );
+        for (numbers, [cell, ..]) in numbers.iter_mut().zip(&mut *cells) {
+            *cell = self.cells.pick(numbers.next());
+        }
+        for (ray, index) in rays.iter_mut().zip(&mut *cells) {
+            let cell = index[0];
+            ray.part = self.starts.partition_point(|start| *start <= cell) - 1;
+            let [_, n2, n3, n4] = parts[ray.part].cells;
+            let local = cell - self.starts[ray.part];
+            *index = [
+                local / (n2 * n3 * n4),
+                local / (n3 * n4) % n2,
+                local / n4 % n3,
+                local % n4,
+            ];
+        }
+        for (pair, axis) in [0, 2].into_iter().enumerate() {
+            for (((ray, index), numbers), hat) in rays.iter().zip(&*cells).zip(&mut *numbers).zip(&mut *hats) {
+                *hat = self.under[ray.part][pair]
+                    .as_ref()
+                    .and_then(|table| table.pick([index[axis], index[axis + 1]], numbers.next()));
             }
-            used += 1;
-            numbers[used - 1]
-        };
-        let cell = self.cells.pick(next());
-        let part = self.starts.partition_point(|start| *start <= cell) - 1;
-        let field = &self.field.parts[part];
-        let wraps = field.part.wraps();
-        let [_, n2, n3, n4] = field.cells;
-        let local = cell - self.starts[part];
-        let index = [
-            local / (n2 * n3 * n4),
-            local / (n3 * n4) % n2,
-            local / n4 % n3,
-            local % n4,
-        ];
-        let mut pair = |table: &Option<UnderTents>, axis: usize| {
-            let cell = [index[axis], index[axis + 1]];
-            match table {
-                Some(table) => table.draw(cell, &mut next),
-                None => [0, 1].map(|k| under_tent(cell[k], next(), field.cells[axis + k], wraps && axis + k == 0)),
+            for (((ray, index), numbers), hat) in rays.iter_mut().zip(&*cells).zip(&mut *numbers).zip(&*hats) {
+                let (field, cell) = (&parts[ray.part], [index[axis], index[axis + 1]]);
+                ray.coordinates[pair] = match &self.under[ray.part][pair] {
+                    Some(table) => table.point(cell, *hat, || numbers.next()),
+                    None => [0, 1].map(|k| {
+                        let wraps = field.part.wraps() && axis + k == 0;
+                        under_tent(cell[k], numbers.next(), field.cells[axis + k], wraps)
+                    }),
+                };
             }
-        };
-        let place = pair(&self.under[part][0], 0);
-        let direction = pair(&self.under[part][1], 2);
-        (part, place, direction)
+        }
+    }
+}
+
+/// Rays that can be drawn at a time.
+pub const TOGETHER: usize = 64;
+
+/// What is drawn of a ray.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Drawn {
+    /// The part of the surface that it leaves.
+    pub part: usize,
+    /// Its place and its direction there.
+    pub coordinates: [[f64; 2]; 2],
+}
+
+/// The uniform numbers of one ray.
+#[derive(Clone, Copy)]
+struct Numbers {
+    stream: Stream,
+    /// Of the ray.
+    index: u64,
+    /// The next block of numbers, those at hand, and how many of them have been used.
+    block: u64,
+    numbers: [f64; 4],
+    used: usize,
+}
+
+impl Numbers {
+    fn new(stream: Stream, index: u64) -> Self {
+        Self {
+            stream,
+            index,
+            block: 1,
+            numbers: stream.uniforms(index, 0),
+            used: 0,
+        }
+    }
+
+    #[inline(always)]
+    fn next(&mut self) -> f64 {
+        if self.used == 4 {
+            (self.numbers, self.used) = (self.stream.uniforms(self.index, self.block), 0);
+            self.block += 1;
+        }
+        self.used += 1;
+        self.numbers[self.used - 1]
     }
 }
 
@@ -134,15 +196,20 @@ impl RaySource for FieldRays<'_> {
         let flux = self.sampler.flux / self.rays as f64;
         batch.len = (range.end - range.start) as usize;
         batch.colour.clear();
-        for (i, index) in range.enumerate() {
-            let (part, place, direction) = self.sampler.draw(stream, index);
-            let (x, k) = self.sampler.field.parts[part].part.ray(place, direction);
-            for (axis, (x, k)) in [(x.x, k.x), (x.y, k.y), (x.z, k.z)].into_iter().enumerate() {
-                batch.position[axis][i] = x;
-                batch.direction[axis][i] = k;
+        let mut drawn = [Drawn::default(); TOGETHER];
+        for begin in (0..batch.len).step_by(TOGETHER) {
+            let drawn = &mut drawn[..TOGETHER.min(batch.len - begin)];
+            self.sampler.draw(stream, range.start + begin as u64, drawn);
+            for (i, ray) in (begin..).zip(&*drawn) {
+                let [place, direction] = ray.coordinates;
+                let (x, k) = self.sampler.field.parts[ray.part].part.ray(place, direction);
+                for (axis, (x, k)) in [(x.x, k.x), (x.y, k.y), (x.z, k.z)].into_iter().enumerate() {
+                    batch.position[axis][i] = x;
+                    batch.direction[axis][i] = k;
+                }
             }
-            batch.flux[i] = flux;
         }
+        batch.flux[..batch.len].fill(flux);
         batch.settle();
     }
 }
@@ -168,9 +235,13 @@ mod tests {
             let [i, j, k, l] = [0, 1, 2, 3].map(|m| cell_of(at[m], [4, 2, 4, 2][m]));
             part * 64 + ((i * 2 + j) * 4 + k) * 2 + l
         };
-        for index in 0..rays {
-            let (part, place, direction) = sampler.draw(stream, index);
-            counts[bin(part, [place[0], place[1], direction[0], direction[1]])] += 1.0;
+        let mut drawn = [Drawn::default(); TOGETHER];
+        for first in (0..rays).step_by(TOGETHER) {
+            sampler.draw(stream, first, &mut drawn);
+            for ray in drawn {
+                let [[x, y], [a, b]] = ray.coordinates;
+                counts[bin(ray.part, [x, y, a, b])] += 1.0;
+            }
         }
         let mut expected = vec![0.0; 128];
         let n = 32_usize;

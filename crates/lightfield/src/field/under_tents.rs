@@ -4,7 +4,7 @@
 //! hat is picked by what it contributes under the tent, and each coordinate is drawn by itself, under a hat times a tent: by
 //! rejection, from the narrower of the two.
 
-use etendue_sampling::alias::Alias;
+use etendue_sampling::alias::Aliases;
 
 use super::factor::Factor;
 use super::tent::{inside, tent_offset};
@@ -13,8 +13,10 @@ use super::tent::{inside, tent_offset};
 #[derive(Clone, Debug)]
 pub struct UnderTents {
     axes: [Axis; 2],
-    /// For each tent the hats that lie under it, by what they contribute; None where the factor is 0.
-    tables: Vec<Option<Alias>>,
+    /// For each tent of either axis the middle of the first hat under it, from that of the tent, and how many hats there are.
+    firsts: [Vec<(f64, usize)>; 2],
+    /// For each tent the hats that lie under it, by what they contribute; without entries where the factor is 0.
+    tables: Aliases,
 }
 
 impl UnderTents {
@@ -24,9 +26,10 @@ impl UnderTents {
         let axes = [0, 1].map(|k| Axis {
             hats: factor.side(),
             tents: cells[k],
+            half: factor.side() as f64 / cells[k] as f64,
             wraps: k == 0 && factor.wraps(),
         });
-        let mut tables = Vec::with_capacity(cells[0] * cells[1]);
+        let mut tables = Aliases::default();
         let mut weights = Vec::new();
         for i in 0..cells[0] {
             for j in 0..cells[1] {
@@ -36,26 +39,36 @@ impl UnderTents {
                     let of = |column: &Hat| factor.node(row.cell, column.cell) * (row.share * column.share);
                     weights.extend(columns.iter().map(of));
                 }
-                tables.push(Alias::new(&weights));
+                tables.push(&weights);
             }
         }
-        Self { axes, tables }
+        let firsts = axes.map(|axis| {
+            (0..axis.tents)
+                .map(|tent| (axis.first(tent), axis.count(tent)))
+                .collect()
+        });
+        Self { axes, firsts, tables }
     }
 
-    /// A point with density proportional to `factor · tent`, from `next`, a source of uniform numbers in (0, 1); the centre of the
-    /// tent if the factor is 0 all over it.
-    pub fn draw(&self, tent: [usize; 2], mut next: impl FnMut() -> f64) -> [f64; 2] {
-        let [rows, columns] = self.axes;
-        let Some(table) = &self.tables[tent[0] * columns.tents + tent[1]] else {
+    /// One of the hats under a tent, from a uniform number in (0, 1); None if the factor is 0 all over the tent.
+    #[inline(always)]
+    #[must_use]
+    pub fn pick(&self, tent: [usize; 2], number: f64) -> Option<usize> {
+        self.tables.pick(tent[0] * self.axes[1].tents + tent[1], number)
+    }
+
+    /// A point with density proportional to `hat · tent`, from `next`, a source of uniform numbers in (0, 1); the centre of the
+    /// tent if there is no hat. With a hat from [`Self::pick`] the density is proportional to `factor · tent`.
+    #[inline(always)]
+    pub fn point(&self, tent: [usize; 2], hat: Option<usize>, mut next: impl FnMut() -> f64) -> [f64; 2] {
+        let [rows, columns] = &self.axes;
+        let Some(hat) = hat else {
             return [rows.point(tent[0], 0.0), columns.point(tent[1], 0.0)];
         };
-        let picked = table.pick(next());
-        let [row, column] = [rows.first(tent[0]), columns.first(tent[1])];
-        let many = columns.count(tent[1]);
-        let (row, column) = (row + (picked / many) as f64, column + (picked % many) as f64);
+        let ((row, _), (column, many)) = (self.firsts[0][tent[0]], self.firsts[1][tent[1]]);
         [
-            rows.draw(tent[0], row, &mut next),
-            columns.draw(tent[1], column, &mut next),
+            rows.draw(tent[0], row + (hat / many) as f64, &mut next),
+            columns.draw(tent[1], column + (hat % many) as f64, &mut next),
         ]
     }
 }
@@ -67,6 +80,8 @@ struct Axis {
     /// Cells of either grid.
     hats: usize,
     tents: usize,
+    /// Half the width of a tent.
+    half: f64,
     wraps: bool,
 }
 
@@ -79,20 +94,15 @@ struct Hat {
 }
 
 impl Axis {
-    /// Half the width of a tent.
-    fn half(self) -> f64 {
-        self.hats as f64 / self.tents as f64
-    }
-
     /// The middle of a tent.
     fn middle(self, tent: usize) -> f64 {
-        (tent as f64 + 0.5) * self.half()
+        (tent as f64 + 0.5) * self.half
     }
 
     /// The middle of the first hat under a tent, from that of the tent.
     fn first(self, tent: usize) -> f64 {
         let middle = self.middle(tent);
-        (middle - self.half() - 0.5).floor() + 0.5 - middle
+        (middle - self.half - 0.5).floor() + 0.5 - middle
     }
 
     /// How many hats lie under a tent.
@@ -102,7 +112,7 @@ impl Axis {
         reason = "no more than there are cells, and two"
     )]
     fn count(self, tent: usize) -> usize {
-        (self.half() + 1.0 - self.first(tent)).ceil() as usize
+        (self.half + 1.0 - self.first(tent)).ceil() as usize
     }
 
     /// The hats under a tent.
@@ -124,7 +134,7 @@ impl Axis {
             };
             Hat {
                 cell: usize::try_from(within).map_or(0, |cell| cell.min(self.hats - 1)),
-                share: overlap(first + k as f64, self.half()),
+                share: overlap(first + k as f64, self.half),
             }
         };
         (0..self.count(tent)).map(hat).collect()
@@ -138,7 +148,7 @@ impl Axis {
     /// A coordinate under a tent and a hat whose middle is as far from that of the tent.
     #[inline]
     fn draw(self, tent: usize, hat: f64, next: &mut impl FnMut() -> f64) -> f64 {
-        let half = self.half();
+        let half = self.half;
         // From the narrower of the two, against the highest value of the wider one there.
         let (from, width, other, reach) = if half < 1.0 {
             (0.0, half, hat, 1.0)
@@ -194,13 +204,15 @@ mod tests {
             let stream = Stream::new(9, 1);
             for i in 0..draws {
                 let (mut block, mut used, mut numbers) = (0, 4, [0.0; 4]);
-                let point = under.draw(cell, || {
+                let mut next = || {
                     if used == 4 {
                         (numbers, used, block) = (stream.uniforms(i, block), 0, block + 1);
                     }
                     used += 1;
                     numbers[used - 1]
-                });
+                };
+                let hat = under.pick(cell, next());
+                let point = under.point(cell, hat, &mut next);
                 let bin = point.map(|x| cell_of(x, bins));
                 counts[bin[0] * bins + bin[1]] += 1.0;
             }
