@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from oracles.examples import EXAMPLES, run_example
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 RUNS = {
     "appendix_b.py": (["--rays", "10000"], 7),
     "chapter_2.py": (["--rays", "200000", "--seeds", "4"], 4),
@@ -52,12 +52,26 @@ def test_every_example_is_run() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(RUNS))
-def test_runs_and_draws(name: str, tmp_path: Path) -> None:
+def test_runs_and_draws(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     options, pictures = RUNS[name]
-    command = [sys.executable, str(EXAMPLES / name), *options]
-    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert result.returncode == 0, result.stderr
+    monkeypatch.chdir(tmp_path)
+    printed = run_example(name, options)
     drawn = list(tmp_path.rglob("*.png"))
     assert len(drawn) == pictures
     assert all(path.stat().st_size > 5000 for path in drawn)
-    assert result.stdout.count("\n") >= 3
+    assert printed.count("\n") >= 3
+
+
+@pytest.mark.slow
+def test_an_example_runs_here_as_one_that_is_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Words and pictures, to the byte: the others do not start a process each."""
+    here, apart = tmp_path / "here", tmp_path / "apart"
+    here.mkdir()
+    apart.mkdir()
+    name, (options, _) = "first_picture.py", RUNS["first_picture.py"]
+    monkeypatch.chdir(here)
+    printed = run_example(name, options)
+    command = [sys.executable, str(EXAMPLES / name), *options]
+    result = subprocess.run(command, cwd=apart, capture_output=True, text=True, check=True)
+    assert (printed, "") == (result.stdout, result.stderr)
+    assert (here / "picture.png").read_bytes() == (apart / "picture.png").read_bytes()
