@@ -18,7 +18,7 @@ Hit = tuple[float, float, int]
 
 def _in_polygon(x: float, y: float, vertices: Array) -> bool:
     """Crossing number of a ray along +x."""
-    a, b = vertices, np.roll(vertices, -1, axis=0)
+    a, b = vertices, np.concatenate([vertices[1:], vertices[:1]])
     straddles = (a[:, 1] > y) != (b[:, 1] > y)
     a, b = a[straddles], b[straddles]
     crossing = a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
@@ -133,26 +133,33 @@ def _asphere_roots(shape: dict[str, Any], o: Array, d: Array, start: float, stop
 def _torus_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float, Array]]:
     """Real roots of the quartic (p² + R² - r²)² = 4 R² (x² + y²)."""
     R, r = shape["major"], shape["minor"]
-    square = np.polynomial.Polynomial([o @ o + R * R - r * r, 2 * (o @ d), d @ d])
-    flat = np.polynomial.Polynomial([o[:2] @ o[:2], 2 * (o[:2] @ d[:2]), d[:2] @ d[:2]])
+    square = np.array([d @ d, 2 * (o @ d), o @ o + R * R - r * r])
+    flat = np.array([d[:2] @ d[:2], 2 * (o[:2] @ d[:2]), o[:2] @ o[:2]])
+    quartic = np.convolve(square, square)
+    quartic[2:] -= 4 * R * R * flat
     found = []
-    for t in (square * square - 4 * R * R * flat).roots():
+    for t in np.roots(quartic):
         if abs(t.imag) < 1e-7:
             p = o + t.real * d
-            ring = R * p[:2] / np.linalg.norm(p[:2])
+            ring = R * p[:2] / math.hypot(p[0], p[1])
             found.append((float(t.real), np.array([*(p[:2] - ring), p[2]]) / r))
     return found
+
+
+def _cross(u: Array, v: Array) -> Array:
+    """Vector products, row by row: for a few triangles `numpy.cross` takes ten times as long."""
+    return u[:, [1, 2, 0]] * v[:, [2, 0, 1]] - u[:, [2, 0, 1]] * v[:, [1, 2, 0]]
 
 
 def _mesh_hits(shape: dict[str, Any], o: Array, d: Array) -> list[tuple[float, Array]]:
     """Every triangle by Cramer's rule."""
     a, b, c = (shape["vertices"][shape["triangles"][:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
+    normal = _cross(b - a, c - a)
     across = normal @ d
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.einsum("ij,ij->i", normal, a - o) / across
         p = o + t[:, None] * d
-        inside = [np.einsum("ij,ij->i", normal, np.cross(v - u, p - u)) >= 0 for u, v in ((a, b), (b, c), (c, a))]
+        inside = [np.einsum("ij,ij->i", normal, _cross(v - u, p - u)) >= 0 for u, v in ((a, b), (b, c), (c, a))]
     hit = inside[0] & inside[1] & inside[2] & (across != 0)
     return [(float(t[i]), normal[i] / np.linalg.norm(normal[i])) for i in np.nonzero(hit)[0]]
 
