@@ -63,8 +63,12 @@ def test_of_a_table_its_own_azimuths_are_taken() -> None:
 
 
 @pytest.mark.slow
-def test_a_brushed_surface_in_a_file(tmp_path: Path) -> None:
-    """F at azimuths between those of 45°: within 12 % of the model where it is above a fiftieth of its peak."""
+def test_a_brushed_surface_in_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """F at azimuths between those of 45°: within 12 % of the model where it is above a fiftieth of its peak.
+
+    At the one incidence that the file has: what lies between incidences is looked at in test_bsdf_formats.py.
+    """
+    monkeypatch.setattr("etendue.scatter.files.INCIDENCES", (40.0,))
     bsdf = brushed(sigma=0.1, aspect=3.0)
     path = tmp_path / "brushed.dat"
     lost = et.write_bsdf(path, bsdf, "fred")
