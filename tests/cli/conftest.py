@@ -1,12 +1,17 @@
-"""The fixture that the tests of all verbs share."""
+"""The fixtures that the tests of all verbs share."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, Literal
 
+import etendue as et
 import pytest
 from etendue.cli import main
+from etendue.lightfield.carrier import Surface
+from etendue.quantities.ray_stream import RayStream
 
 from cli.outcome import Outcome, Run
 
@@ -26,3 +31,18 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
         return Outcome(int(leaving.value.code or 0), out, err)
 
     return call
+
+
+@pytest.fixture
+def stand_on(monkeypatch: pytest.MonkeyPatch) -> Callable[[Surface], None]:
+    """State a surface for light fields whose surface is left to the search, which takes seconds and is tried elsewhere."""
+
+    def stated(known: Surface) -> None:
+        fit = et.LightField.fit
+
+        def fitted(rays: RayStream, surface: Surface | Literal["auto"] = "auto", **options: Any) -> et.LightField:
+            return fit(rays, known if surface == "auto" else surface, **options)
+
+        monkeypatch.setattr(et.LightField, "fit", fitted)
+
+    return stated

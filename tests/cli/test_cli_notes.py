@@ -10,7 +10,7 @@ import json
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import etendue as et
 import numpy as np
@@ -24,7 +24,6 @@ from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.luminance.source_report import DISTANCE
 from etendue.plot.scene_layout import lay_out_scene
 from etendue.quantities.printable import printable
-from etendue.quantities.ray_stream import RayStream
 from etendue.scene import compile_scene
 
 from cli.outcome import Run
@@ -409,17 +408,20 @@ def test_every_verb_is_here() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("verb", [verb for verb in VERBS if CASES.get(verb)])
 def test_what_python_knows_is_printed(
-    verb: str, run: Run, folder: Path, kept_fields: Path, monkeypatch: pytest.MonkeyPatch
+    verb: str,
+    run: Run,
+    folder: Path,
+    kept_fields: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    stand_on: Callable[[Surface], None],
 ) -> None:
     # The light field of a file is fitted once for all calls.
     monkeypatch.setenv(FOLDER_VARIABLE, str(kept_fields))
-    # To choose a carrier takes seconds: `led.h5` has the notes of that, all others stand on the disk.
-    fit = et.LightField.fit
-
-    def on_disk(rays: RayStream, surface: Surface | Literal["auto"] = "auto", **options: Any) -> et.LightField:
-        return fit(rays, parse_surface(DISK) if surface == "auto" else surface, **options)
-
-    monkeypatch.setattr(et.LightField, "fit", on_disk)
+    # `led.h5` has the notes of a search for a carrier, all others stand on the disk.
+    stand_on(parse_surface(DISK))
+    # There are no notes in the solid of intensity on a page.
+    solid = {"c": [0, 180], "gamma": [0, 90, 180], "values": [1, 0, 0, 1, 0, 0], "unit": "cd"}
+    monkeypatch.setattr("etendue.viewer.subjects.intensity_solid", lambda _: solid)
     call = CASES[verb]
     assert call is not None
     with warnings.catch_warnings():

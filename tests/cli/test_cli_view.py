@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import etendue as et
 import pytest
+from etendue.lightfield.carrier import Surface
 from viewer.viewables import make_files
 
 from cli.outcome import Run
@@ -37,9 +39,10 @@ def test_the_verb_writes_a_page_and_says_how_exact_it_is(run: Run, files: Path) 
     [("rings.tm25ray", ["--flux", "300"], 300.0), ("trace.h5", ["--detector", "disk"], 100.0)],
 )
 def test_the_command_of_the_page_has_the_options_of_the_page(
-    run: Run, files: Path, file: str, options: list[str], flux: float
+    run: Run, files: Path, stand_on: Callable[[Surface], None], file: str, options: list[str], flux: float
 ) -> None:
     """The map that the command makes is one of the light that the page shows: as much flux, of the same detector."""
+    stand_on(et.Plane(z=0.5, width=80, height=80, centre=(0, 0), focus=(0, 0, 0, 0)))
     assert run("view", files / file, "-o", "a.html", *options).status == 0
     page = (files / "a.html").read_text("utf-8")
     spelled = re.search(r'"options":"([^"]*) "', page)[1].split(" ")  # type: ignore[index]
