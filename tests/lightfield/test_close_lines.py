@@ -8,6 +8,8 @@ import pytest
 from etendue.lightfield.close_lines import BLURRED, TOLD, _distances, blurred_share, crowding
 from oracles.sources import DieUnderDome, LimbDarkenedDisk, PrismaticFilm
 
+FLAT = (0.0, 0.0, 0.0, 0.0)
+"""Of planes that no focus is sought for."""
 
 SIDE = 2.0
 """Of a chip [mm]."""
@@ -55,7 +57,7 @@ def test_a_beam_of_parallel_rays_is_not_taken_for_blur() -> None:
     rng = np.random.default_rng(8)
     position = np.column_stack([rng.uniform(-1, 1, (4000, 2)), np.zeros(4000)])
     beam = et.RaySet(position, np.tile([0.0, 0.0, 1.0], (4000, 1)), np.ones(4000))
-    field = et.LightField.fit(beam, et.Plane(z=0, width=2, height=2), depths=(3, 3, 3, 3))
+    field = et.LightField.fit(beam, et.Plane(z=0, width=2, height=2, focus=FLAT), depths=(3, 3, 3, 3))
     assert np.median(crowding(beam, field)) < BLURRED
     assert not told(field)
 
@@ -69,7 +71,10 @@ N = 20_000
 def seen(field: et.LightField, which: int) -> tuple[float, float]:
     """Mean luminance and error of the middle of a chip over the closed form Φ/(π A)."""
     x, y, flux = ((-25, 3, 70e6), (25, -3, 30e6))[which]
-    observer, screen = et.Observer(50, 100, 1000, target=(x, y, HEIGHTS[which])), et.Screen(0.6 * SIDE, 0.6 * SIDE, 4, 4)
+    observer, screen = (
+        et.Observer(50, 100, 1000, target=(x, y, HEIGHTS[which])),
+        et.Screen(0.6 * SIDE, 0.6 * SIDE, 4, 4),
+    )
     chip = et.luminance_map(field, observer, screen)
     assert set(told(field)) <= set(chip.notes)
     truth = flux / (np.pi * SIDE**2)
@@ -108,7 +113,7 @@ def test_a_surface_that_blurs_part_of_the_light_is_replaced() -> None:
 def test_chips_at_one_height_are_not(unequal: bool) -> None:
     """On the surface that is chosen for them; and of unequal flux, on that same plane."""
     rays = chips((0.0, 0.0), 10_000, seed=2, unequal=unequal)
-    field = et.LightField.fit(rays, et.Plane(z=0, width=52, height=8, centre=(0, 0)) if unequal else "auto")
+    field = et.LightField.fit(rays, et.Plane(z=0, width=52, height=8, centre=(0, 0), focus=FLAT) if unequal else "auto")
     assert not told(field)
     # The mean of some 200 ratios that err by 0.22 each, and some sharpness that any field lacks.
     assert 0.95 < np.median(crowding(rays, field)) < 1.15
@@ -117,7 +122,7 @@ def test_chips_at_one_height_are_not(unequal: bool) -> None:
 KNOWN = {
     LimbDarkenedDisk(): et.Disk(radius=LimbDarkenedDisk().radius, centre=LimbDarkenedDisk().centre),
     PrismaticFilm(): et.Disk(radius=PrismaticFilm().radius, centre=PrismaticFilm().centre),
-    DieUnderDome(): et.Plane(z=0),
+    DieUnderDome(): et.Plane(z=0, focus=FLAT),
 }
 """Sources, each with the surface that is found for it (test_selection.py)."""
 
@@ -137,7 +142,8 @@ def test_sharp_fields_of_known_sources_are_not(source: LimbDarkenedDisk | Prisma
 
 
 def test_rays_of_the_field_itself_pass_each_other_as_it_says() -> None:
-    field = et.LightField.fit(chips((0.0, 0.0), 4000, seed=4), et.Plane(z=0, width=60, height=20), depths=(3, 3, 2, 2))
+    plane = et.Plane(z=0, width=60, height=20, focus=FLAT)
+    field = et.LightField.fit(chips((0.0, 0.0), 4000, seed=4), plane, depths=(3, 3, 2, 2))
     ratio = crowding(field.sample(10_000, seed=9), field)
     # Ratios of counts of 40 and of as many, within five standard errors of the mean of their logarithms.
     assert abs(np.log(ratio).mean()) < 5 * np.sqrt(2 / 40 / 256)

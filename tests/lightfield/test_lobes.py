@@ -14,7 +14,7 @@ Array = npt.NDArray[np.float64]
 
 AXIS = np.array([0.3, -0.2, 0.933]) / np.linalg.norm([0.3, -0.2, 0.933])
 WIDTH, HEIGHT = 3.0, 1.0
-SURFACE = et.Plane(z=0, width=WIDTH, height=HEIGHT, centre=(0, 0))
+SURFACE = et.Plane(z=0, width=WIDTH, height=HEIGHT, centre=(0, 0), focus=(0, 0, 0, 0))
 
 
 def lobe(n: int, kappa: float, seed: int) -> et.RaySet:

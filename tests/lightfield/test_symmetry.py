@@ -18,6 +18,8 @@ from oracles.sources import LimbDarkenedDisk
 from oracles.verdicts import assert_covers
 
 DEPTHS = (3, 3, 3, 3)
+FLAT = (0.0, 0.0, 0.0, 0.0)
+"""Of planes that no focus is sought for."""
 MAPS = {
     "mirror-x": [lambda x, y: (-x, y)],
     "mirror-y": [lambda x, y: (x, -y)],
@@ -80,7 +82,7 @@ def test_a_symmetric_source_is_found_and_its_errors_shrink() -> None:
 @pytest.mark.slow
 def test_what_a_field_was_folded_by_is_known_and_kept(tmp_path: Path) -> None:
     rays = et.RaySet(*rays_of(4000, 5), np.ones(4000))
-    plane = et.Plane(z=0, width=2, height=2, centre=(0, 0))
+    plane = et.Plane(z=0, width=2, height=2, centre=(0, 0), focus=FLAT)
     for asked, found in (("none", "none"), ("mirror-y", "mirror-y"), ("auto", "mirror-y")):
         field = et.LightField.fit(rays, plane, depths=DEPTHS, symmetry=asked)
         assert field.report.symmetry == found
@@ -106,7 +108,7 @@ def test_images_of_a_ray_tell_nothing_more_of_the_flux(
     )
     weights = np.random.default_rng(7).gamma(2.0, 1.0, n) if weighted else np.ones(n)
     rays = et.RaySet(*rays_of(n, 6), weights)
-    plane = et.Plane(z=0, width=2, height=2, centre=(0, 0))
+    plane = et.Plane(z=0, width=2, height=2, centre=(0, 0), focus=FLAT)
     field = et.LightField.fit(rays, plane, depths=(1, 1, 1, 1), symmetry=symmetry)
     relative = field.parts[0].deviation / field.parts[0].ratio
     np.testing.assert_allclose(relative, np.sqrt(np.sum(weights**2)) / np.sum(weights), rtol=1e-5)
@@ -116,11 +118,11 @@ def test_images_of_a_ray_tell_nothing_more_of_the_flux(
 def test_error_bars_of_folded_fields_cover_the_truth() -> None:
     """Each ray stands for two: error bars that took them for independent ones would be too small by √2.
 
-    Fits to twelve other seeds covered 76.4 and 96.4 %: the errors are too large for a source as smooth as this one. These
-    shares spread by 0.063 and 0.020, as those of 45 and 90 independent lines.
+    Fits to twelve other seeds covered 78.4 and 96.8 %: the errors are too large for a source as smooth as this one. These
+    shares spread by 0.081 and 0.021, as those of 25 and 74 independent lines.
     """
-    source, n = LimbDarkenedDisk(), 60_000
-    plane = et.Plane(z=0, width=2 * source.radius, height=2 * source.radius, centre=(0, 0))
+    source, n = LimbDarkenedDisk(), 30_000
+    plane = et.Plane(z=0, width=2 * source.radius, height=2 * source.radius, centre=(0, 0), focus=FLAT)
     centre = np.array([*source.centre, 0])
     deviations = []
     for seed in range(8, 14):
@@ -137,7 +139,7 @@ def test_error_bars_of_folded_fields_cover_the_truth() -> None:
         )
         value, error = field.luminance(points=points, directions=directions)
         deviations.append((value - truth) / error)
-    assert_covers(deviations=np.concatenate(deviations), effective=6 * 45, one=(0.745, 0.785), two=(0.955, 0.975))
+    assert_covers(deviations=np.concatenate(deviations), effective=6 * 25, one=(0.76, 0.8), two=(0.96, 0.975))
 
 
 def test_an_asymmetry_of_two_per_cent_is_seen_with_a_million_rays() -> None:
@@ -159,7 +161,7 @@ def test_without_any_symmetry_none_is_found() -> None:
 def test_a_stated_symmetry_that_the_rays_refute_is_told() -> None:
     """A luminance that rises along x by the law 1 + 0.8 x is even in y alone; χ² of 2⁴ cells is that of their pairs."""
     x, k = rays_of(4000, 7, slope=0.8)
-    rays, plane = et.RaySet(x, k, np.ones(len(x))), et.Plane(z=0, width=2, height=2, centre=(0, 0), focus=(0, 0, 0, 0))
+    rays, plane = et.RaySet(x, k, np.ones(len(x))), et.Plane(z=0, width=2, height=2, centre=(0, 0), focus=FLAT)
     fitted = {
         name: et.LightField.fit(rays, plane, depths=(1, 1, 1, 1), symmetry=name) for name in ("mirror-x", "mirror-y")
     }
