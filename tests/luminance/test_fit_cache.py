@@ -37,6 +37,10 @@ def fits(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return made
 
 
+FLAT = et.Plane(z=0, focus=(0, 0, 0, 0))
+"""A plane that no focus is sought for."""
+
+
 def led(seed: int = 1, n: int = 1000) -> et.RaySet:
     rng = np.random.default_rng(seed)
     k = rng.normal((0.2, 0.1, 1.0), 0.5, (n, 3))
@@ -46,7 +50,7 @@ def led(seed: int = 1, n: int = 1000) -> et.RaySet:
 
 
 def seen(rays: et.RaySet, **options: Any) -> et.LuminanceMap:
-    return et.luminance_map(rays, EYE, SCREEN, **{"surface": et.Plane(z=0), **options})
+    return et.luminance_map(rays, EYE, SCREEN, **{"surface": FLAT, **options})
 
 
 def forget() -> None:
@@ -91,8 +95,8 @@ def test_another_ray_surface_unit_or_program_is_another_fit(fits: list[int], mon
     place[500, 1] += 1e-3
     seen(et.RaySet(place, rays.direction, rays.flux))
     seen(rays.with_total_flux(7.0))
-    seen(rays, surface=et.Plane(z=0.1))
-    seen(rays, surface=et.Plane(z=0.1000000001))
+    seen(rays, surface=et.Plane(z=0.1, focus=FLAT.focus))
+    seen(rays, surface=et.Plane(z=0.1000000001, focus=FLAT.focus))
     assert len(fits) == 5
     monkeypatch.setattr(fit_cache, "_program", lambda: "another")
     seen(rays)
@@ -105,7 +109,7 @@ def test_a_scene_with_a_ray_file_is_fitted_once(
 ) -> None:
     # On a surface that is known: the search for one takes longest, and is no matter here.
     fit = LightField.fit
-    monkeypatch.setattr(LightField, "fit", staticmethod(lambda rays, _, **more: fit(rays, et.Plane(z=0), **more)))
+    monkeypatch.setattr(LightField, "fit", staticmethod(lambda rays, _, **more: fit(rays, FLAT, **more)))
     et.write_rays(tmp_path / "led.tm25ray", led())
     scene = et.Scene(sources=[{"kind": "rays", "file": str(tmp_path / "led.tm25ray"), "flux": 30}])
     first = et.luminance_map(scene, EYE, SCREEN, rays_per_pixel=4)
@@ -169,7 +173,8 @@ def test_two_processes_share_the_folder(folder: Path, tmp_path: Path) -> None:
         "rays = et.read_rays(sys.argv[1])\n"
         "for i in range(3):\n"
         "    from etendue.lightfield import fit_cache; fit_cache._memory.clear()\n"
-        "    m = et.luminance_map(rays, et.Observer(25, 40, 300), et.Screen(3, 3, 12, 12), surface=et.Plane(z=0))\n"
+        "    view = et.Observer(25, 40, 300), et.Screen(3, 3, 12, 12)\n"
+        "    m = et.luminance_map(rays, *view, surface=et.Plane(z=0, focus=(0, 0, 0, 0)))\n"
         "    if i % 2: et.clear_cache()\n"
         "print(float(m.values.sum()).hex())\n"
     )

@@ -154,7 +154,7 @@ def test_scenes_of_nothing_but_measured_sources_are_framed_by_their_light(tmp_pa
     # Rays of a field and of patches are others, of the same light.
     folder = tmp_path / "patches"
     et.GriddedSource.fit(rays, et.Plane(z=7), pixel=1.0, threshold=20).save_patches(folder)
-    field = et.LightField.fit(rays, et.Plane(z=7), depths=(3, 3, 3, 3))
+    field = et.LightField.fit(rays, et.Plane(z=7, focus=(0, 0, 0, 0)), depths=(3, 3, 3, 3))
     for source in ({"kind": "light-field", "field": field}, {"kind": "gridded", "file": str(folder), "draws": 1000}):
         (screen,) = framed_screens(et.Scene(sources=[source]), [observer], 64, 32)
         assert abs(screen.width / framed(rays, observer, 64, 32).width - 1) < 0.25
@@ -186,7 +186,8 @@ def test_light_that_starts_beyond_the_observer_is_told(method: str) -> None:
     place = np.column_stack([rng.uniform(-10, 10, (n, 2)), np.where(behind, 600.0, 0.0)])
     lamps = et.RaySet(place, direction, np.full(n, 1 / n))
     view, screen = et.Observer(0, 0, 300), et.Screen(40, 40, 8, 8)
-    how = et.Cone(acceptance=5) if method == "cone" else et.FromField(surface=et.Plane(z=0, width=300, height=300))
+    wall = et.Plane(z=0, width=300, height=300, focus=(0, 0, 0, 0))
+    how = et.Cone(acceptance=5) if method == "cone" else et.FromField(surface=wall)
     (note,) = (m for m in et.luminance_map(lamps, view, screen, method=how).notes if "beyond" in m)
     share, seen = float(re.search(r"about (\d+)%", note)[1]) / 100, FEW_SEEN if method == "lightfield" else 250  # type: ignore[index]
     assert abs(share - 0.25) < 4 * math.sqrt(0.25 * 0.75 / seen) + 0.005

@@ -143,7 +143,7 @@ def test_the_light_field_route_shows_the_same_source(lamp: dict[str, Any]) -> No
     """A field that is fitted to rays drawn from the patches, another estimator: the same picture, within its own blur."""
     grid = lamp["gridded"]
     observer, screen = et.Observer(20, 60, 200, target=(0.3, 0.0, 0.2)), et.Screen(2, 2, 8, 8)
-    field = et.LightField.fit(grid.sample(200_000, 3), et.Plane(z=0.2), depths=(3, 3, 3, 3))
+    field = et.LightField.fit(grid.sample(100_000, 3), et.Plane(z=0.2, focus=(0, 0, 0, 0)), depths=(3, 3, 3, 3))
     sources: list[dict[str, Any]] = [{**lamp, "draws": 10}, {"kind": "light-field", "field": field}]
     one, other = (
         et.luminance_map(et.Scene(sources=[source]), observer, screen, rays_per_pixel=64, seed=1) for source in sources

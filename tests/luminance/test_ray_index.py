@@ -82,7 +82,7 @@ def test_automatic_acceptance_is_that_of_the_full_pass(cloud: et.RaySet, index: 
 @pytest.mark.slow
 def test_drawn_rays_and_rays_of_a_field_are_indexed_too() -> None:
     rings = et.RingSource((2.0, 5.0), (30.0, 20.0), rays=200_000, seed=3)
-    field = et.LightField.fit(rings, et.Plane(z=0.0), depths=(3, 3, 3, 3))
+    field = et.LightField.fit(rings.ray_set().subset(20_000, seed=1), et.Disk(radius=5), depths=(3, 3, 2, 2))
     where = et.Observer(25, 10, 60), et.Screen(14, 14, 8, 8)
     for source in (rings, field.rays(50_000, seed=2)):
         index = et.RayIndex.build(source)
