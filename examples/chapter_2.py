@@ -84,7 +84,9 @@ def measured_noise(source: et.RingSource, lmap: et.LuminanceMap) -> list[float]:
     ]
 
 
-def print_tables(source: et.RingSource, runs: Runs, smooth: dict[str, et.LuminanceMap], seeds: int) -> None:
+def print_tables(
+    source: et.RingSource, runs: Runs, smooth: dict[str, et.LuminanceMap], truth: et.LuminanceMap, seeds: int
+) -> None:
     print("\nTable 2.1: rays per run, eqs. 2.7 and 2.8")
     for zone, (flux, area, rays) in enumerate(zip(source.ring_flux, source.ring_area, source.allocation, strict=True)):
         luminance = source.zone_luminance[zone]
@@ -97,7 +99,6 @@ def print_tables(source: et.RingSource, runs: Runs, smooth: dict[str, et.Luminan
     ):
         pairs = zip(measured_noise(source, lmap), predicted_noise(source, lmap.screen, count), strict=True)
         print(f"  {title:<22}" + "   ".join(f"{m:7.2%} / {p:6.2%}" for m, p in pairs))
-    truth = true_map(source, runs.fine)
     print("\n128 × 128 pixels, all seeds, against the true map")
     print(f"  {'filter':<20}{'NCC':>9}{'NRMSE 3.6':>11}{'NRMSE':>9}   zone error 1 / 2 / 3        intensity [cd]")
     for name, lmap in {"none": runs.fine, **smooth}.items():
@@ -171,8 +172,8 @@ def main() -> None:
     rate = total / seconds / 1e6
     print(f"{total:,} rays drawn and mapped at two resolutions in {seconds:.1f} s: {rate:.1f} million rays/s")
     smooth = {kind: et.filter_map(runs.fine, kind, size=5, gamma=0.2) for kind in FILTERS}
-    print_tables(source, runs, {**smooth, "opt": et.denoise_map(runs.fine)}, options.seeds)
     truth = true_map(source, runs.fine)
+    print_tables(source, runs, {**smooth, "opt": et.denoise_map(runs.fine)}, truth, options.seeds)
     top = 1.15 * source.zone_luminance[0]
     draw_maps(options.output / "figure-2.6.png", "Figure 2.6: no noise", [("lines of sight", truth)], top)
     estimates = [("128 × 128 pixels", runs.fine), ("32 × 32 pixels", runs.coarse)]

@@ -267,10 +267,11 @@ def print_material(
     print(f"\nstandard error of a pixel of the truth: {error:.0f} cd/m²")
 
 
-def print_fewer_scans(truth: et.LuminanceMap, lid: et.Intensity, lines: int, rays: int, step: float) -> None:
-    """How many angles suffice for an intensity distribution and for a map (section 4.3); in steps [°], the most of them."""
+def print_fewer_scans(truth: et.LuminanceMap, lid: et.Intensity, lines: int, rays: int, *, full: bool) -> None:
+    """How many angles suffice for an intensity distribution and for a map (section 4.3); in full, steps of 5° as well."""
     print("\nPET: tables of other numbers of scans")
-    for angles in ((45.0,), (5.0, 80.0), (5.0, 60.0, 80.0), PET_ANGLES, tuple(np.arange(5.0, 86.0, step))):
+    most = [tuple(np.arange(5.0, 86.0, 5.0))] if full else []
+    for angles in ((45.0,), (5.0, 80.0), (5.0, 60.0, 80.0), PET_ANGLES, *most):
         table = finish_of(goniometer.table(PET, angles))
         c = et.compare(look(table, truth.screen, lines), truth, REGION)
         same = alike(distribution(table, rays), lid)
@@ -280,10 +281,11 @@ def print_fewer_scans(truth: et.LuminanceMap, lid: et.Intensity, lines: int, ray
         )
 
 
-def print_noisy_scans(truth: et.LuminanceMap, lid: et.Intensity, lines: int, rays: int) -> None:
+def print_noisy_scans(truth: et.LuminanceMap, lid: et.Intensity, lines: int, rays: int, *, full: bool) -> None:
     """What few scans with errors give: joined by straight lines, and smoothed as far as the values say."""
     print("\nPET: six scans, each value with noise")
-    for noise, (name, made) in itertools.product((0.0, 0.05, 0.2), {"lines": table, "smooth": smoothed}.items()):
+    noises = (0.0, 0.05, 0.2) if full else (0.2,)
+    for noise, (name, made) in itertools.product(noises, {"lines": table, "smooth": smoothed}.items()):
         wall = finish_of(made(PET, PET_ANGLES, noise))
         lmap = look(wall, truth.screen, lines)
         c, same = et.compare(lmap, truth, REGION), alike(distribution(wall, rays), lid)
@@ -345,8 +347,8 @@ def main() -> None:
             far[material][name] = distribution(finish, rays)
         print_material(material, maps[material], far[material], seconds)
     pet = maps["PET"]
-    print_fewer_scans(pet["truth"], far["PET"]["truth"], lines, rays, 5.0 if options.full else 20.0)
-    print_noisy_scans(pet["truth"], far["PET"]["truth"], lines, rays)
+    print_fewer_scans(pet["truth"], far["PET"]["truth"], lines, rays, full=options.full)
+    print_noisy_scans(pet["truth"], far["PET"]["truth"], lines, rays, full=options.full)
     edges = look_at_edges(screen, lines)
     rest = look(without_specular(materials["PET"]["diffuse + specular"]), screen, lines)
     light = split(rest, pet["diffuse + specular"], pet["truth"])

@@ -95,7 +95,7 @@ def print_diffusers() -> None:
     print_table(["table 5.1", "n", "B, thesis", "B", "FWHM, thesis", "FWHM [°]"], rows)
 
 
-def print_instrument(output: Path) -> None:
+def print_instrument(output: Path, *, full: bool) -> None:
     """Figs. 5.1, 5.2 and 5.6, and the width of 1.8° that the thesis states."""
     rows = []
     for diameter in (25.4, *APERTURES):
@@ -115,7 +115,7 @@ def print_instrument(output: Path) -> None:
 
     ideal = et.ScatterGoniometer()
     real = et.ScatterGoniometer(divergence=0.03, source_angle=0.1, profile=(1.0, 1.0, 0.98, 0.96, 0.9))
-    sim = ideal.instrument_function(0.1, 1.8, rays=10**6)
+    sim = ideal.instrument_function(0.1, 1.8, rays=10**6 if full else 10**5)
     device = real.instrument_function(0.1, 1.8)
     both = np.maximum(sim.flux, device.flux)
     off = np.abs(device.flux - sim.flux) / np.where(both > 0, both, 1)
@@ -171,7 +171,7 @@ def draw_lobe(
 def deconvolve_diffusers(output: Path, *, full: bool, fresh: bool) -> None:
     """Figs. 5.3, 5.4 and 5.5: 10⁴ iterations, E(i), and stops."""
     goniometer = et.ScatterGoniometer()
-    bare = goniometer.instrument_function(0.1, rays=10**6)
+    bare = goniometer.instrument_function(0.1, rays=10**6 if full else 10**5)
     rows, rules = [], []
     made = new_figure(9.0, 5.6, "Four lobes (figs. 5.3 and 5.5): scanned, and without the instrument")
     course = new_figure(9.0, 2.8, "Four lobes (fig. 5.4): the error function")
@@ -346,7 +346,7 @@ def main() -> None:
     options.output.mkdir(parents=True, exist_ok=True)
     seeds = options.seeds or (20 if options.full else 1)
     print_diffusers()
-    print_instrument(options.output)
+    print_instrument(options.output, full=options.full)
     deconvolve_diffusers(options.output, full=options.full, fresh=options.fresh)
     if options.ranges:
         stops_by_range()

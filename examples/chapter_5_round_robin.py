@@ -84,16 +84,16 @@ Scan = et.GoniometerScan | et.DirectionalScan
 
 
 def exact(material: Material, *, coarse: bool) -> list[tuple[Scan, et.GoniometerScan]]:
-    """Scans of the sample and of the bare beam, by each instrument without its noise; or of broad lobes in coarse steps."""
+    """Scans of the sample and of the bare beam, by each instrument without its noise; or in coarse steps."""
     pairs: list[tuple[Scan, et.GoniometerScan]] = []
     for one in LABORATORIES.values():
         silent = dataclasses.replace(one.goniometer, photons=None, dark=0.0, drift=0.0)
         if material.operator == "window":
-            step = WINDOW * (2.5 if coarse else 1)
+            step = WINDOW * (3.2 if coarse else 1)
             wide = silent.measure_window(material.bsdf, material.theta, step, material.span, method="quadrature")
             pairs.append((wide, silent.instrument_function(0.5 * one.step)))
             continue
-        step = one.step * (4 if coarse and material.span > 5.0 else 1)
+        step = one.step * (1 if not coarse else 2 if material.span <= 5.0 else 8)
         options = {"theta": material.theta, "step": step, "span": material.span}
         scan = silent.measure(material.bsdf, method="quadrature", **options)  # type: ignore[arg-type]
         pairs.append((scan, silent.instrument_function(0.5 * one.step)))

@@ -26,7 +26,7 @@ from etendue.luminance.gridded_map import gridded_luminance_map
 from experiments import led, phosphor
 from experiments.differences import draw_cuts, draw_differences
 from experiments.gridded_counts import GriddedCounts, counted
-from experiments.panels import INK, LINES, QUICK, measures, noise, print_table
+from experiments.panels import INK, LINES, measures, noise, print_table
 from experiments.sweeping import (
     draw_sweep,
     far_field,
@@ -309,7 +309,7 @@ def experiment(name: str, options: argparse.Namespace) -> None:
     if not options.full:
         coarse = et.Screen(lamp.screen.width, lamp.screen.height, 23, 23)
         lamp = dataclasses.replace(lamp, lines=4, screen=coarse)
-        marks, depths = [options.rays // 4, options.rays], QUICK if name != "film" else (2, 2, 2, 2)
+        marks, depths = [options.rays // 4, options.rays], (2, 2, 2, 2)
     print(f"\n# {name}\n")
     method = et.PathTracing(rays_per_pixel=lamp.lines)
     truth = et.luminance_map(lamp.scene, lamp.observers, lamp.screen, method=method)

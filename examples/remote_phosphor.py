@@ -19,7 +19,7 @@ import numpy as np
 from etendue.luminance.gridded_map import gridded_luminance_map
 from etendue.plot import style
 from experiments import film
-from experiments.panels import LINES, QUICK, draw_maps, legend_below, measures, new_figure, noise, print_table, save
+from experiments.panels import LINES, draw_maps, legend_below, measures, new_figure, noise, print_table, save
 from experiments.phosphor import BOX, CARRIER, FLUX, TOP, lamp
 
 OBSERVERS = [et.Observer(theta, phi, 1000) for phi in (0, 90) for theta in (0, 30, 60, 80)]
@@ -49,7 +49,7 @@ def sources(kind: str, rays: et.RaySet, depths: tuple[int, int, int, int] | None
     """Light fields: on the plane of the topmost surface, as the thesis has it; on a box whose sides shine too; automatic."""
     found = {"field, plane": et.LightField.fit(rays, et.Plane(TOP[kind], 24.2, 24.2, centre=(0, 0)), depths=depths)}
     if kind == "film":
-        found["field, box"] = et.LightField.fit(rays, BOX, depths=depths and (2, 2, 2, 2))  # six parts
+        found["field, box"] = et.LightField.fit(rays, BOX, depths=depths)
     if depths is None:
         found["field, automatic"] = et.LightField.fit(rays, "auto")
         print(f"    automatic: {found['field, automatic'].surface.spec}")
@@ -78,7 +78,7 @@ def experiment(kind: str, options: argparse.Namespace) -> dict[float, dict[str, 
     rays = result.rays.only
     middle = time.perf_counter()
     print(f"\n{kind}: {rays.total_flux:.1f} lm of {FLUX:g} lm leave it in {len(rays):,} rays of {options.rays:,}")
-    fields = sources(kind, rays, None if options.full else QUICK)
+    fields = sources(kind, rays, None if options.full else (2, 2, 2, 2))
     plane = et.Plane(TOP[kind], *CARRIER[kind], centre=(0, 0))
     observers = [
         et.Observer(o.theta, o.phi, o.distance, target=(0, 0, TOP[kind]))
