@@ -20,8 +20,9 @@ from unittest.mock import patch
 import etendue as et
 from etendue.cli import main
 from etendue.scene import compile_scene
+from oracles.examples import run_example
 
-from docs.pages import ROOT, Block, blocks, name_of
+from docs.pages import Block, blocks, name_of
 
 DOCTEST_FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
@@ -83,7 +84,7 @@ def run_command(command: list[str]) -> tuple[int, str]:
             return run_here(arguments)
         assert name == "python", f"{name!r} is not étendue's command"
         assert arguments[0].startswith("examples/"), f"{arguments[0]!r} is no example"
-        return run_apart([sys.executable, str(ROOT / arguments[0]), *arguments[1:]])
+        return 0, run_example(arguments[0].removeprefix("examples/"), arguments[1:])
 
 
 def run_apart(arguments: list[str]) -> tuple[int, str]:
