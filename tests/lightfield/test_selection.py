@@ -14,6 +14,7 @@ from etendue.errors import ArgumentError
 from etendue.lightfield.carrier import Box, Cylinder, Disk, Dome, Hemisphere, Plane, Sphere
 from etendue.lightfield.selection.scorer import SurfaceScorer
 from etendue.lightfield.selection.search import SurfaceChoice, choose_surface, told_apart
+from etendue.lightfield.selection.settings import SelectionSettings
 from etendue.quantities.report import RayFileWarning
 from oracles.bodies import Block, Globe, Rod
 from oracles.sources import DieUnderDome, LimbDarkenedDisk, PrismaticFilm, StructuredLed
@@ -21,6 +22,9 @@ from oracles.sources import DieUnderDome, LimbDarkenedDisk, PrismaticFilm, Struc
 Array = npt.NDArray[np.float64]
 
 N, MANY = 20_000, 40_000
+
+QUICK = SelectionSettings(one_fold_from=1, search_one_fold_from=1)
+"""One fold is held out: for what must not matter, however well the surfaces are told apart."""
 MOVE = np.array([0.3, -0.2, 0.75])
 """So that no depth is zero, and none is at an axis."""
 
@@ -137,7 +141,7 @@ def test_a_rod_is_a_cylinder() -> None:
 @pytest.mark.parametrize("reach", [0.0, 3.0], ids=["by its start points", "by its lines"])
 def test_a_block_is_a_box(reach: float) -> None:
     block = Block()
-    choice = choose_surface(rays_of(*scattered(*block.rays(N, seed=1), reach)))
+    choice = choose_surface(rays_of(*scattered(*block.rays(N, seed=1), reach)), settings=QUICK)
     surface = choice.surface
     assert isinstance(surface, Box)
     error = 0.02 if reach else 1e-3
@@ -160,16 +164,21 @@ def assert_alike(choice: SurfaceChoice, other: SurfaceChoice, length: float = 1.
     assert b.centre == pytest.approx([c * length + move for c in a.centre], abs=1e-6 * length)  # type: ignore[union-attr]
 
 
-@pytest.mark.slow
-def test_the_unit_of_length_does_not_matter(led_choice: SurfaceChoice) -> None:
-    position, direction = led_lines()
-    assert_alike(led_choice, choose_surface(rays_of(position * 1e-3, direction)), length=1e-3)
+@pytest.fixture(scope="module")
+def quick_choice() -> SurfaceChoice:
+    return choose_surface(rays_of(*led_lines(5000)), settings=QUICK)
 
 
 @pytest.mark.slow
-def test_the_number_of_threads_does_not_matter_nor_the_unit_of_flux(led_choice: SurfaceChoice) -> None:
-    other = choose_surface(rays_of(*led_lines(), flux_unit="W"), threads=1)
-    assert (other.surface, other.table, other.depths) == (led_choice.surface, led_choice.table, led_choice.depths)
+def test_the_unit_of_length_does_not_matter(quick_choice: SurfaceChoice) -> None:
+    position, direction = led_lines(5000)
+    assert_alike(quick_choice, choose_surface(rays_of(position * 1e-3, direction), settings=QUICK), length=1e-3)
+
+
+@pytest.mark.slow
+def test_the_number_of_threads_does_not_matter_nor_the_unit_of_flux(quick_choice: SurfaceChoice) -> None:
+    other = choose_surface(rays_of(*led_lines(5000), flux_unit="W"), threads=1, settings=QUICK)
+    assert (other.surface, other.table, other.depths) == (quick_choice.surface, quick_choice.table, quick_choice.depths)
 
 
 @pytest.mark.slow
@@ -177,7 +186,7 @@ def test_where_the_source_is_does_not_matter(led_choice: SurfaceChoice) -> None:
     """So far off that coordinates have no more than ten digits for the source."""
     move = 1e6
     position, direction = led_lines()
-    choice = choose_surface(rays_of(position + move, direction))
+    choice = choose_surface(rays_of(position + move, direction), settings=QUICK)
     assert isinstance(choice.surface, Plane)
     assert choice.surface.z == pytest.approx(MOVE[2] + move, abs=2e-3)
     assert choice.surface.area == pytest.approx(led_choice.surface.area, rel=0.01)
@@ -185,7 +194,7 @@ def test_where_the_source_is_does_not_matter(led_choice: SurfaceChoice) -> None:
 
 @pytest.mark.slow
 def test_where_on_their_lines_rays_start_does_not_matter(led_choice: SurfaceChoice) -> None:
-    choice = choose_surface(rays_of(*scattered(*led_lines(), 1000.0)))
+    choice = choose_surface(rays_of(*scattered(*led_lines(), 1000.0)), settings=QUICK)
     assert isinstance(choice.surface, Plane)
     assert choice.surface.z == pytest.approx(MOVE[2], abs=2e-3)
     assert choice.surface.area == pytest.approx(led_choice.surface.area, rel=0.01)
@@ -196,7 +205,7 @@ def test_start_points_on_a_plane_of_any_depth_do_not_hide_the_source() -> None:
     """Rays stopped at an exit plane, far above what shines."""
     position, direction = led_lines()
     at_plane = position + ((5.0 - position[:, 2]) / direction[:, 2])[:, None] * direction
-    choice = choose_surface(rays_of(at_plane, direction))
+    choice = choose_surface(rays_of(at_plane, direction), settings=QUICK)
     assert isinstance(choice.surface, Plane)
     assert choice.surface.z == pytest.approx(MOVE[2], abs=2e-3)
 
@@ -206,7 +215,7 @@ def test_strays_far_off_do_not_matter(led_choice: SurfaceChoice) -> None:
     position, direction = (values.copy() for values in led_lines(MANY))
     rng = np.random.default_rng(3)
     position[:400], direction[:400] = rng.normal(size=(400, 3)) * 100, rng.normal(size=(400, 3))
-    choice = choose_surface(rays_of(position, direction / np.linalg.norm(direction, axis=1)[:, None]))
+    choice = choose_surface(rays_of(position, direction / np.linalg.norm(direction, axis=1)[:, None]), settings=QUICK)
     assert isinstance(choice.surface, Plane)
     assert choice.surface.z == pytest.approx(MOVE[2], abs=4e-3)
     assert choice.surface.area == pytest.approx(led_choice.surface.area, rel=0.02)
@@ -235,7 +244,7 @@ def test_a_point_is_where_its_rays_meet() -> None:
     rng = np.random.default_rng(4)
     turn, square = rng.random(1500) * 2 * np.pi, 0.9 * rng.random(1500)
     k = np.stack([np.sqrt(square) * np.cos(turn), np.sqrt(square) * np.sin(turn), np.sqrt(1 - square)], axis=1)
-    choice = choose_surface(rays_of(np.array([0.5, 0.3, 2.0]) + 5 * k, k))
+    choice = choose_surface(rays_of(np.array([0.5, 0.3, 2.0]) + 5 * k, k), settings=QUICK)
     middle = np.mean([part.centre for part in choice.surface.parts()], axis=0)
     assert middle == pytest.approx([0.5, 0.3, 2.0], abs=1e-6)
     assert choice.surface.area < 1e-12
@@ -247,7 +256,9 @@ def test_a_beam_keeps_its_cross_section() -> None:
     towards = (0.3, 0.1, 0.9)
     rng = np.random.default_rng(5)
     position = np.column_stack([rng.uniform(-1, 1, (2000, 2)) * [1.0, 0.6], np.full(2000, 4.0)])
-    choice = choose_surface(rays_of(position, np.tile(np.array(towards) / np.linalg.norm(towards), (2000, 1))))
+    choice = choose_surface(
+        rays_of(position, np.tile(np.array(towards) / np.linalg.norm(towards), (2000, 1))), settings=QUICK
+    )
     surface = choice.surface
     assert isinstance(surface, Plane)
     assert (surface.width, surface.height, surface.z) == pytest.approx((2.0, 1.2, 4.0), rel=2e-3)
@@ -256,7 +267,7 @@ def test_a_beam_keeps_its_cross_section() -> None:
 @pytest.mark.slow
 def test_light_towards_minus_z_gets_a_closed_surface_and_a_hint() -> None:
     position, direction = led_lines(5000)
-    choice = choose_surface(rays_of(position * [1, -1, -1], direction * [1, -1, -1]))
+    choice = choose_surface(rays_of(position * [1, -1, -1], direction * [1, -1, -1]), settings=QUICK)
     assert not isinstance(choice.surface, Plane | Disk | Hemisphere | Dome)
     assert choice.depths is None
     assert choice.table[0].unmet < 0.01
@@ -346,7 +357,7 @@ def test_depths_that_differ_are_told_apart(z: float, apart: float) -> None:
 @pytest.mark.slow
 def test_the_choice_is_told_in_the_words_of_the_trade() -> None:
     """What was chosen and why; every other surface with its distance, and a reason if it predicts better."""
-    choice = choose_surface(et.RingSource(rays=40_000))
+    choice = choose_surface(et.RingSource(rays=20_000))
     told = choice.notes[0]
     assert told.startswith(f"carrier surface {choice.surface.told}: ")
     assert "better than others" not in told

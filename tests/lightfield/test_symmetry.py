@@ -118,10 +118,10 @@ def test_images_of_a_ray_tell_nothing_more_of_the_flux(
 def test_error_bars_of_folded_fields_cover_the_truth() -> None:
     """Each ray stands for two: error bars that took them for independent ones would be too small by √2.
 
-    Fits to twelve other seeds covered 78.4 and 96.8 %: the errors are too large for a source as smooth as this one. These
-    shares spread by 0.081 and 0.021, as those of 25 and 74 independent lines.
+    Fits to twelve other seeds covered 76.4 and 96.4 %: the errors are too large for a source as smooth as this one. These
+    shares spread by 0.063 and 0.020, as those of 45 and 90 independent lines.
     """
-    source, n = LimbDarkenedDisk(), 30_000
+    source, n = LimbDarkenedDisk(), 60_000
     plane = et.Plane(z=0, width=2 * source.radius, height=2 * source.radius, centre=(0, 0), focus=FLAT)
     centre = np.array([*source.centre, 0])
     deviations = []
@@ -139,7 +139,7 @@ def test_error_bars_of_folded_fields_cover_the_truth() -> None:
         )
         value, error = field.luminance(points=points, directions=directions)
         deviations.append((value - truth) / error)
-    assert_covers(deviations=np.concatenate(deviations), effective=6 * 25, one=(0.76, 0.8), two=(0.96, 0.975))
+    assert_covers(deviations=np.concatenate(deviations), effective=6 * 45, one=(0.745, 0.785), two=(0.955, 0.975))
 
 
 def test_an_asymmetry_of_two_per_cent_is_seen_with_a_million_rays() -> None:

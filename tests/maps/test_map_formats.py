@@ -117,7 +117,8 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
 def test_cut_at_every_byte(name: str, sound: dict[str, bytes], tmp_path: Path) -> None:
     path, whole = path_of(name, tmp_path), sound[name]
     assert len(whole) > 300
-    for length in range(len(whole)):
+    # Headers are within the first bytes, tables of what is where within the last ones.
+    for length in sorted({*range(300), *range(300, len(whole), 5), *range(len(whole) - 50, len(whole))}):
         path.write_bytes(whole[:length])
         with pytest.raises(FormatError, match="map"):
             read_map(path)

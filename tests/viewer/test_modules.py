@@ -316,8 +316,8 @@ def test_all_figures_of_a_region_are_of_the_same_pixels(modules: Path) -> None:
 def test_the_error_of_a_flux_is_that_of_the_rays(modules: Path) -> None:
     """Of fields of 20 000 rays of an LED, whose flux through a plane is known by quadrature, in regions large and small.
 
-    The root mean square of z is below 1.3, of 5 fields and 4 regions, whose light is partly the same: of 10 independent
-    ones it would be 1.7 by 10⁻³. The error is not many times too large either: it is the counting error, which a field
+    The root mean square of z is below 1.3, of 3 fields and 4 regions, whose light is partly the same: of 6 independent
+    ones it would be 1.9 by 10⁻³. The error is not many times too large either: it is the counting error, which a field
     undercuts where it smooths, here by up to some six times.
     """
     led, z, cells = PackagedLed(), -0.2368, 40
@@ -334,7 +334,7 @@ def test_the_error_of_a_flux_is_that_of_the_rays(modules: Path) -> None:
         regions.append([(xs[0], ys[0]), (xs[1], ys[0]), (xs[1], ys[1]), (xs[0], ys[1])])
     view = {"theta": 0, "phi": 0, "distance": 500, "target": [*led.centre, z], "width": led.side}
     scores = []
-    for seed in range(1, 6):
+    for seed in range(1, 4):
         position, direction = led.rays(20_000, seed=seed)
         rays = et.RaySet(position, direction, np.full(len(position), led.total_flux / len(position)))
         packed = FieldTables.of(et.LightField.fit(rays, around, depths=(4, 4, 3, 3), seed=seed)).packed()
