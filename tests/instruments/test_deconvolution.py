@@ -35,6 +35,10 @@ def truth(*, name: str, angle: Array) -> Array:
     return np.asarray(top(exponent=DIFFUSERS[name]) * np.cos(np.radians(angle)) ** DIFFUSERS[name])
 
 
+pytestmark = pytest.mark.xdist_group(__name__)
+"""One worker makes the scans that the tests share."""
+
+
 @functools.cache
 def exact_scan(name: str) -> GoniometerScan:
     """Without noise, by quadrature; of SD4, which is no model, by its own two-dimensional integral."""

@@ -34,6 +34,10 @@ METAL = et.bsdf.RoughMetal(roughness=0.03, roughness_across=0.015, reflectance=0
 """Turned by 30°, none is its own mirror image in the plane of incidence."""
 
 
+pytestmark = pytest.mark.xdist_group(__name__)
+"""One worker makes the scans that the tests share."""
+
+
 @functools.cache
 def exact_scan(name: str) -> DirectionalScan:
     sample = {"gaussian": GAUSSIAN, "abg": ABG, "metal": METAL}[name]

@@ -38,9 +38,10 @@ def illuminance_of_disk(*, run: NearFieldRun) -> np.ndarray:
 def test_readings_of_a_function_are_off_by_what_they_state() -> None:
     """χ² per reading against the sum, from 0.2 (errors twice as large as need be) to 1.25 (4σ of some 100 readings)."""
     goniophotometer = et.NearFieldGoniophotometer(step=15, camera_pixels=32)
-    for samples in (4, 9, 64):
-        run = goniophotometer.measure(disk, size=2.0 * RADIUS, samples=samples)
-        true = illuminance_of_disk(run=run)
+    runs = [goniophotometer.measure(disk, size=2.0 * RADIUS, samples=samples) for samples in (4, 9, 64)]
+    true = illuminance_of_disk(run=runs[0])
+    for run in runs:
+        assert run.setting.positions.gamma.tolist() == runs[0].setting.positions.gamma.tolist()
         lit = true > 1e-3 * true.max()
         off = (run.illuminance - true)[lit] / run.illuminance_error[lit]
         assert lit.sum() > 90
