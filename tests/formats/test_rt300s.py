@@ -13,14 +13,19 @@ from etendue.formats.rt300s import read_rt300s
 from etendue.scatter.scans.files import SHADOW
 
 
+@pytest.fixture(scope="module")
+def scans(samples: Path) -> et.Scans:
+    folder = samples / "bsdf"
+    return et.read_scans([folder / "AnoBlackEC1_goniometer.xls"], blank=folder / "blank_goniometer.xls")
+
+
 @pytest.mark.slow
-def test_the_real_scan_without_its_blank_is_the_published_table(samples: Path) -> None:
+def test_the_real_scan_without_its_blank_is_the_published_table(samples: Path, scans: et.Scans) -> None:
     """In three bands of the angle from the normal medians of f over the table's are 1 to 6 %. The signal is π f cosθ;
     without the cosine, or with the blank left in, they are not. Single values differ more: the publishers averaged and
     filled in, and their lobes at 50 and 70° do not lean towards grazing as the scan does."""
     folder = samples / "bsdf"
-    raw, blank = (folder / f"{name}_goniometer.xls" for name in ("AnoBlackEC1", "blank"))
-    scans = et.read_scans([raw], blank=blank)
+    raw = folder / "AnoBlackEC1_goniometer.xls"
     away = np.degrees(np.arccos(np.einsum("ij,ij->i", scans.incident, scans.scattered)))
     assert away.min() > SHADOW
     assert 2400 < scans.values.size < 2508
@@ -56,10 +61,8 @@ def test_the_real_scan_without_its_blank_is_the_published_table(samples: Path) -
     ],
     ids=["gaussian", "coat"],
 )
-def test_the_method_that_is_chosen_finds_shares_of_known_surfaces(samples: Path, known: et.Bsdf) -> None:
+def test_the_method_that_is_chosen_finds_shares_of_known_surfaces(scans: et.Scans, known: et.Bsdf) -> None:
     """At the directions of the real scan, without noise: the directional-hemispherical reflectance to 1 %."""
-    folder = samples / "bsdf"
-    scans = et.read_scans([folder / "AnoBlackEC1_goniometer.xls"], blank=folder / "blank_goniometer.xls")
     values = known.evaluate(scans.incident, scans.scattered)
     table = et.Bsdf.from_scans(et.Scans(scans.incident, scans.scattered, values))
     assert isinstance(table, et.BsdfTable)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError
+from etendue.lightfield.diagnostics import Diagnostics
 from etendue.plot.bsdf_picture import polar_surface
 from etendue.quantities.bsdf_directions import direction
 from etendue.quantities.threshold_sweep import COLUMNS, ThresholdSweep
@@ -18,6 +20,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from oracles.light_fields import SURFACES, make_field
 from oracles.map_files import make_map
+
+pytestmark = pytest.mark.xdist_group(__name__)
+"""One worker makes what the tests draw."""
 
 LENS = et.Scene(solids=[{"name": "lens", "shape": {"kind": "ball", "radius": 4}, "medium": "PMMA"}])
 
@@ -37,21 +42,29 @@ def swept() -> et.SweepTable:
     return et.SweepTable({"lens.at.2": rising}, values, errors, {"escaped": "lm", "peak:far": "cd"}, done=3)
 
 
+@functools.cache
 def lobe() -> et.Deconvolution:
     angle = np.linspace(-5.0, 5.0, 41)
     scan = et.GoniometerScan(angle, np.exp(-(angle**2)))
     return et.deconvolve(scan, et.GoniometerScan(angle, np.exp(-4.0 * angle**2)), stop=5)
 
 
+@functools.cache
 def wide_lobe() -> et.DirectionalDeconvolution:
     goniometer = et.ScatterGoniometer(photons=1e6)
     scan = goniometer.measure_window(et.bsdf.Gaussian(peak=200.0, sigma=0.012), 60, step=1, span=4, method="quadrature")
     return et.deconvolve_directions(scan, stop=5, regular=False, replicates=4)
 
 
+@functools.cache
 def near_field() -> et.NearFieldRun:
     disk = {"kind": "surface", "shape": {"kind": "disk", "radius": 2}, "flux": 100}
     return et.NearFieldGoniophotometer(step=(30, 90), camera_pixels=16).measure(et.Scene(sources=[disk]))
+
+
+@functools.cache
+def characteristic() -> Diagnostics:
+    return et.diagnose(make_field(SURFACES["disk"]))
 
 
 DRAWN: dict[str, tuple[int, Callable[..., Any]]] = {
@@ -63,7 +76,7 @@ DRAWN: dict[str, tuple[int, Callable[..., Any]]] = {
     "comparison": (3, lambda **given: et.plot_comparison(et.compare(make_map(), make_map()), **given)),
     "threshold": (2, lambda **given: et.plot_threshold_sweep(sweep(), **given)),
     "sweep": (2, lambda **given: et.plot_sweep(swept(), **given)),
-    "characteristic": (2, lambda **given: et.plot_characteristic(et.diagnose(make_field(SURFACES["disk"])), **given)),
+    "characteristic": (2, lambda **given: et.plot_characteristic(characteristic(), **given)),
     "deconvolution": (3, lambda **given: et.plot_deconvolution(lobe(), **given)),
     "directions": (4, lambda **given: et.plot_directions(wide_lobe(), **given)),
     "near field": (4, lambda **given: et.plot_near_field(near_field(), **given)),
