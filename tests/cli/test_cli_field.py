@@ -18,6 +18,7 @@ from etendue.cli import fit as fit_verb
 from etendue.cli import sample as sample_verb
 from etendue.lightfield.carrier import Disk, Plane, Surface
 from etendue.lightfield.diagnostics import diagnose
+from etendue.lightfield.fit_cache import FOLDER_VARIABLE
 from oracles.light_fields import SURFACES, make_field
 from oracles.sources import LimbDarkenedDisk
 
@@ -288,8 +289,10 @@ def test_luminance_of_a_field_is_the_map_of_the_api(run: Run, folder: Path, tmp_
     ],
 )
 def test_luminance_of_rays_by_their_light_field(
-    run: Run, folder: Path, tmp_path: Path, options: Any, method: Any
+    run: Run, folder: Path, tmp_path: Path, options: Any, method: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # The same rays on the same surface are fitted once; on another one, or with another flux, a second time.
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "kept"))
     rays = et.read_rays(folder / "led.tm25ray")
     arguments = [*VIEW[:4], "--target", "1,-0.5,0", "--size", "12,9", "--pixels", "12,9"]
     assert run("luminance", folder / "led.tm25ray", *arguments, *options, "-o", "a.npz").status == 0

@@ -373,7 +373,7 @@ def test_lines_go_on_where_patches_do_not_pay() -> None:
 def test_colours_and_light_fields_are_gathered_too() -> None:
     """Two wavelengths of unequal shares, walls that reflect them unequally, a light field beside the lamp: the light image
     of rays forwards, which knows of no patches, has the same values."""
-    field = et.LightField.fit(et.RingSource(rays=100_000), et.Disk(radius=30), depths=(3, 3, 2, 2))
+    field = et.LightField.fit(et.RingSource(rays=20_000), et.Disk(radius=30), depths=(3, 3, 2, 2))
     scene = tray()
     tint = {"kind": "lambertian", "reflectance": {"wavelength": [450, 650], "values": [0.9, 0.4]}}
     scene["surfaces"] = [dict(s, finish=tint if s["finish"] == WHITE else s["finish"]) for s in scene["surfaces"]]

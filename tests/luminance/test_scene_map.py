@@ -392,6 +392,10 @@ def test_error_bars_hold() -> None:
 @pytest.mark.slow
 def test_rays_are_fitted_before_they_are_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(fit_cache.FOLDER_VARIABLE, str(tmp_path / "kept"))
+    # On the disk itself, for which a search takes seconds.
+    fit = et.LightField.fit
+    disk = et.Disk(radius=30)
+    monkeypatch.setattr(et.LightField, "fit", staticmethod(lambda rays, _, **how: fit(rays, disk, **how)))
     rings = et.RingSource(rays=20_000, seed=3)
     rays = et.RaySet.merge([et.RaySet(b.position, b.direction, b.flux) for b in rings.batches()])
     et.write_rays(tmp_path / "rings.tm25ray", rays)

@@ -105,8 +105,10 @@ def test_the_light_around_a_scene_is_all_of_it() -> None:
 
 
 @pytest.mark.slow
-def test_the_progress_of_a_scene_goes_on_through_the_fit() -> None:
+def test_the_progress_of_a_scene_goes_on_through_the_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     """It rises from the first rays to all of them, and most of it is the fit's."""
+    solid = {"c": [0, 180], "gamma": [0, 90, 180], "values": [1, 0, 0, 1, 0, 0], "unit": "cd"}
+    monkeypatch.setattr("etendue.viewer.subjects.intensity_solid", lambda _: solid)
     seen: list[int] = []
     lamp = {"kind": "surface", "shape": {"kind": "rectangle", "width": 2, "height": 1}, "flux": 5}
     exhibit_of(et.Scene(sources=[lamp]), name="lamp", rays=5000, cache=False, progress=seen.append)
