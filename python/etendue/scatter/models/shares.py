@@ -147,7 +147,10 @@ class DiffuseSpecular(Scattering):
 
 
 class Transmitter(Scattering):
-    """Light goes straight on; an ideal transmitting surface, without refraction.
+    """Light passes without Fresnel's reflection: an ideal transmitting surface.
+
+    It goes straight on. On a face between media of unlike index it is refracted by Snell's law; beyond the critical angle
+    the share that would be transmitted is mirrored.
 
     Parameters
     ----------
@@ -172,7 +175,7 @@ class Transmitter(Scattering):
 
 
 class Mixed(Scattering):
-    """Any mixture of specular and Lambertian reflection and transmission.
+    """Any mixture of specular and Lambertian reflection and transmission; specular transmission is that of `Transmitter`.
 
     Parameters
     ----------
