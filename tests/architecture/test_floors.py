@@ -377,7 +377,17 @@ def test_no_crate_is_unsafe_prints_or_opens_files() -> None:
             assert not re.search(word, code), f"{path.relative_to(ROOT)}: {word}"
 
 
-PARTS_OF_BSDFS = ("albedo", "drawn", "examples", "facets", "gauss", "monotone_cubic", "profile", "shares")
+PARTS_OF_BSDFS = (
+    "albedo",
+    "drawn",
+    "examples",
+    "facet_lattice",
+    "facets",
+    "gauss",
+    "monotone_cubic",
+    "profile",
+    "shares",
+)
 """What several kinds of BSDF are made of."""
 
 

@@ -124,6 +124,23 @@ impl Table {
         }
     }
 
+    /// Adds `share` of the values for light that arrives at an angle with this cosine to `sums`, one for each wavelength at which
+    /// there are nodes.
+    #[inline]
+    pub fn add_all(&self, cosine: f64, share: f64, sums: &mut [f64]) {
+        let columns = self.wavelength.len();
+        let (i, u) = if self.angle.len() == 1 {
+            (0, 0.0)
+        } else {
+            place(&self.angle, cosine.clamp(-1.0, 1.0).acos())
+        };
+        let row = |i: usize| &self.values[i * columns..(i + 1) * columns];
+        let (low, high) = (row(i), row(if u == 0.0 { i } else { i + 1 }));
+        for ((sum, low), high) in sums.iter_mut().zip(low).zip(high) {
+            *sum += share * ((1.0 - u) * low + u * high);
+        }
+    }
+
     /// Its value, if it is the same everywhere.
     #[must_use]
     pub fn constant_value(&self) -> Option<f64> {
@@ -183,6 +200,25 @@ mod tests {
         assert!((at(0.5, 600.0) - (0.5 * 4.0 + 0.5 * 4.0)).abs() < 1e-12);
         assert_eq!(at(1.4, 900.0), 0.0);
         assert_eq!(at(0.0, 300.0), 1.0);
+    }
+
+    #[test]
+    fn all_wavelengths_at_once_are_those_of_each() {
+        let several = Table::new(
+            vec![0.0, 1.0],
+            vec![400.0, 500.0, 700.0],
+            vec![1.0, 2.0, 6.0, 3.0, 8.0, 0.0],
+        );
+        let alone = Table::new(vec![0.0], vec![400.0, 500.0], vec![0.25, 0.5]);
+        for table in [several, alone].map(|table| table.expect("sound")) {
+            for angle in [0.0, 0.3, 1.0, 1.5] {
+                let mut sums = vec![0.5; table.wavelength.len()];
+                table.add_all(f64::cos(angle), 2.0, &mut sums);
+                for (sum, w) in sums.iter().zip(&table.wavelength) {
+                    assert!((sum - 0.5 - 2.0 * table.at(f64::cos(angle), *w)).abs() < 1e-12);
+                }
+            }
+        }
     }
 
     #[test]

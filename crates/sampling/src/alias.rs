@@ -199,7 +199,9 @@ mod tests {
     fn tables_in_a_row_are_those_of_each() {
         let weights = [vec![1.0, 3.0, 0.5], vec![0.0, 0.0], vec![2.0], vec![0.0, 1.0, 4.0, 2.0]];
         let mut row = Aliases::default();
-        weights.iter().for_each(|w| row.push(w));
+        for weights in &weights {
+            row.push(weights);
+        }
         for (table, weights) in weights.iter().enumerate() {
             for k in 0..100 {
                 let u = (f64::from(k) + 0.5) / 100.0;

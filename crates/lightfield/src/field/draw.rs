@@ -148,7 +148,7 @@ struct Numbers {
     index: u64,
     /// The next block of numbers, those at hand, and how many of them have been used.
     block: u64,
-    numbers: [f64; 4],
+    at_hand: [f64; 4],
     used: usize,
 }
 
@@ -158,7 +158,7 @@ impl Numbers {
             stream,
             index,
             block: 1,
-            numbers: stream.uniforms(index, 0),
+            at_hand: stream.uniforms(index, 0),
             used: 0,
         }
     }
@@ -166,11 +166,11 @@ impl Numbers {
     #[inline(always)]
     fn next(&mut self) -> f64 {
         if self.used == 4 {
-            (self.numbers, self.used) = (self.stream.uniforms(self.index, self.block), 0);
+            (self.at_hand, self.used) = (self.stream.uniforms(self.index, self.block), 0);
             self.block += 1;
         }
         self.used += 1;
-        self.numbers[self.used - 1]
+        self.at_hand[self.used - 1]
     }
 }
 

@@ -88,35 +88,49 @@ impl ByHeight {
     }
 }
 
+/// What a function is at the directions that shares are tabled for, all in front: height by height; azimuths within, if it depends
+/// on them.
+pub fn at_nodes<T: Send>(turning: bool, of: impl Fn(Vec3) -> T + Sync) -> Vec<Vec<T>> {
+    let row = &|k: usize| -> Vec<T> {
+        let height = (k as f64 / HEIGHTS as f64).powi(3);
+        let across = ((1.0 - height) * (1.0 + height)).sqrt();
+        let turns = if turning { TURNS } else { 0 };
+        let at = |k: usize| {
+            let (s, c) = (FRAC_PI_2 * k as f64 / TURNS as f64).sin_cos();
+            of(Vec3::new(across * c, across * s, height))
+        };
+        (0..=turns).map(at).collect()
+    };
+    // The rows take long and do not depend on each other.
+    let threads = std::thread::available_parallelism().map_or(1, usize::from).min(HEIGHTS);
+    let every = &|first: usize| {
+        (first..HEIGHTS)
+            .step_by(threads)
+            .map(|k| row(k + 1))
+            .collect::<Vec<_>>()
+    };
+    let mut dealt: Vec<_> = std::thread::scope(|scope| {
+        let started: Vec<_> = (0..threads).map(|first| scope.spawn(move || every(first))).collect();
+        let ended = started.into_iter().map(std::thread::ScopedJoinHandle::join);
+        ended
+            .map(|rows| {
+                rows.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+                    .into_iter()
+            })
+            .collect()
+    });
+    (0..HEIGHTS).filter_map(|k| dealt[k % threads].next()).collect()
+}
+
 impl<const N: usize> Albedo<N> {
     /// From the shares at a direction in front.
     pub fn new(turning: bool, of: impl Fn(Vec3) -> [f64; N] + Sync) -> Self {
-        let row = &|k: usize| -> Vec<[f64; N]> {
-            let height = (k as f64 / HEIGHTS as f64).powi(3);
-            let across = ((1.0 - height) * (1.0 + height)).sqrt();
-            let turns = if turning { TURNS } else { 0 };
-            let at = |k: usize| {
-                let (s, c) = (FRAC_PI_2 * k as f64 / TURNS as f64).sin_cos();
-                of(Vec3::new(across * c, across * s, height))
-            };
-            (0..=turns).map(at).collect()
-        };
-        // The rows take long and do not depend on each other.
-        let threads = std::thread::available_parallelism().map_or(1, usize::from).min(HEIGHTS);
-        let every = &|first: usize| {
-            (first..HEIGHTS)
-                .step_by(threads)
-                .map(|k| row(k + 1))
-                .collect::<Vec<_>>()
-        };
-        let shares: Vec<_> = std::thread::scope(|scope| {
-            let started: Vec<_> = (0..threads).map(|first| scope.spawn(move || every(first))).collect();
-            let ended = started.into_iter().map(std::thread::ScopedJoinHandle::join);
-            ended
-                .map(|rows| rows.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-                .collect()
-        });
-        let mut values: Vec<_> = (0..HEIGHTS).map(|k| shares[k % threads][k / threads].clone()).collect();
+        Self::from_nodes(at_nodes(turning, of))
+    }
+
+    /// From the shares at the nodes, as [`at_nodes`] has them.
+    pub fn from_nodes(mut values: Vec<Vec<[f64; N]>>) -> Self {
+        // Along the surface as at the lowest height above it.
         values.insert(0, values[0].clone());
         Self { values }
     }

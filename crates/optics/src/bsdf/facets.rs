@@ -2,10 +2,10 @@
 //!
 //! Directions and facets are above the surface here, on the side of the light: heights are positive.
 
-use std::f64::consts::{FRAC_1_PI, PI};
+use std::f64::consts::FRAC_1_PI;
 
 use etendue_math::Vec3;
-use etendue_math::special::{exp, ln, ln_gamma};
+use etendue_math::special::{exp, ierfc, ln_gamma, ln_gamma_of_both};
 use etendue_math::trig::sin_cos_turns;
 
 /// The slopes of facets: along the axis and across it.
@@ -39,6 +39,7 @@ impl Facets {
     }
 
     /// tan² of the slope of a facet over α².
+    #[inline(always)]
     fn slope(&self, h: Vec3) -> f64 {
         let (x, y) = (h.x / self.alpha[0], h.y / self.alpha[1]);
         (x * x + y * y) / (h.z * h.z)
@@ -59,49 +60,52 @@ impl Facets {
         FRAC_1_PI * shape / (self.alpha[0] * self.alpha[1] * z2 * z2)
     }
 
+    /// Of Trowbridge and Reitz; otherwise of Beckmann.
+    pub fn ggx(&self) -> bool {
+        self.ggx
+    }
+
     /// Smith's Λ of a direction, times its height: how much the facets hide of each other `[Heitz2014]`.
     pub fn hidden(&self, d: Vec3) -> f64 {
-        Self::hidden_of(self.across(d), d.z, self.ggx)
-    }
-
-    fn across(&self, d: Vec3) -> f64 {
-        let (x, y) = (d.x * self.alpha[0], d.y * self.alpha[1]);
-        (x * x + y * y).sqrt()
-    }
-
-    fn hidden_of(across: f64, height: f64, ggx: bool) -> f64 {
-        if ggx {
-            // (√(z² + q²) − z)/2 without a difference of like numbers.
-            0.5 * across * across / ((height * height + across * across).sqrt() + height)
-        } else if across <= 0.0 {
-            0.0
+        if self.ggx {
+            self.hidden_of::<true>(d)
         } else {
-            let a = height / across;
-            let tail = 0.5 * across * exp(-a * a) / PI.sqrt();
-            (tail - 0.5 * height * libm::erfc(a)).max(0.0)
+            self.hidden_of::<false>(d)
+        }
+    }
+
+    /// The same of a kind that is known beforehand.
+    #[inline(always)]
+    pub fn hidden_of<const GGX: bool>(&self, d: Vec3) -> f64 {
+        let (x, y) = (d.x * self.alpha[0], d.y * self.alpha[1]);
+        let across = (x * x + y * y).sqrt();
+        if GGX {
+            // (√(z² + q²) − z)/2 without a difference of like numbers.
+            0.5 * across * across / ((d.z * d.z + across * across).sqrt() + d.z)
+        } else {
+            0.5 * across * ierfc(d.z / across)
         }
     }
 
     /// The part of the facets that both directions see, if they are on the same side, over the product of their heights, from
     /// what each has hidden.
+    #[inline(always)]
     pub fn seen_by_both(i: f64, o: f64, hidden: [f64; 2]) -> f64 {
         1.0 / (i * o + hidden[0] * o + hidden[1] * i)
     }
 
     /// The same of directions on both sides of the surface, not over their heights: facets that are high for the one are low for
     /// the other `[Heitz2014]`.
+    ///
+    /// B(1 + a, 1 + b), which is less than 1/a and 1/b: where one of them is above [`MOST_HIDDEN`], nothing to speak of.
+    #[inline(always)]
     pub fn seen_through(i: f64, o: f64, hidden: [f64; 2]) -> f64 {
-        let [a, b] = [hidden[0] / i, hidden[1] / o];
-        let (most, least) = if a > b { (a, b) } else { (b, a) };
-        // B(1 + a, 1 + b).
-        if most < 1e4 {
-            exp(ln_gamma(1.0 + a) + ln_gamma(1.0 + b) - ln_gamma(2.0 + a + b))
-        } else if least < 500.0 {
-            // Γ(1 + a)/Γ(2 + a + b) for large a, to 1/a²: DLMF 5.11.13.
-            exp(ln_gamma(1.0 + least) - (1.0 + least) * ln(most + 1.0 + 0.5 * least))
-        } else {
-            0.0
-        }
+        let (a, b) = (hidden[0] / i, hidden[1] / o);
+        let (a, b) = (
+            if a < MOST_HIDDEN { a } else { MOST_HIDDEN },
+            if b < MOST_HIDDEN { b } else { MOST_HIDDEN },
+        );
+        exp(ln_gamma_of_both::<true>(1.0 + a, 1.0 + b) - ln_gamma(2.0 + a + b))
     }
 
     /// A facet that `i` sees, from two numbers, with the density of those of GGX with the same α `[Dupuy2023]`; how much more of
@@ -110,31 +114,38 @@ impl Facets {
     /// With the chance of each facet that light arrives at it and gets away, over the second number, as acceptance, the
     /// directions have the density of the light.
     pub fn draw(&self, i: Vec3, [turn, height]: [f64; 2]) -> Drawn {
+        let turn = sin_cos_turns(turn);
+        if self.ggx {
+            self.drawn::<true>(i, turn, height)
+        } else {
+            self.drawn::<false>(i, turn, height)
+        }
+    }
+
+    /// The same of a kind that is known beforehand, from the sine and the cosine of the turn.
+    #[inline(always)]
+    pub fn drawn<const GGX: bool>(&self, i: Vec3, (sine, cosine): (f64, f64), height: f64) -> Drawn {
         let stretched = Vec3::new(i.x * self.alpha[0], i.y * self.alpha[1], i.z);
         let w = stretched * stretched.length().recip();
         let z = (1.0 - height) * (1.0 + w.z) - w.z;
         let across = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
-        let (s, c) = sin_cos_turns(turn);
-        let cap = Vec3::new(across * c + w.x, across * s + w.y, (z + w.z).max(0.0));
+        let cap = Vec3::new(across * cosine + w.x, across * sine + w.y, (z + w.z).max(0.0));
         let h = Vec3::new(cap.x * self.alpha[0], cap.y * self.alpha[1], cap.z);
         let h = h * h.length().max(f64::MIN_POSITIVE).recip();
         // Seen facets of GGX: D (i·h) G₁/z, with G₁/z = 1/(z + hidden).
-        let proposed = i.z + Self::hidden_of(self.across(i), i.z, true);
-        if self.ggx {
+        let proposed = i.z + self.hidden_of::<true>(i);
+        if GGX {
             return Drawn {
                 h,
                 more: proposed,
                 most: 1.0,
             };
         }
-        let ratio = if h.z > 0.0 {
-            let t = self.slope(h);
-            exp(-t) * (1.0 + t) * (1.0 + t)
-        } else {
-            0.0
-        };
+        let t = self.slope(h);
+        let ratio = exp(-t) * (1.0 + t) * (1.0 + t);
+        let ratio = if h.z > 0.0 { ratio } else { 0.0 };
         // e⁻ᵗ (1 + t)² is 4/e at most, for t = 1.
-        let most = 4.0 * (-1.0_f64).exp() * proposed / (i.z + self.hidden(i));
+        let most = 4.0 * (-1.0_f64).exp() * proposed / (i.z + self.hidden_of::<GGX>(i));
         Drawn {
             h,
             more: ratio * proposed,
@@ -142,6 +153,9 @@ impl Facets {
         }
     }
 }
+
+/// The most that facets hide of a direction over its height, as far as that is told apart.
+const MOST_HIDDEN: f64 = 1e8;
 
 /// A facet that is drawn.
 #[derive(Clone, Copy, Debug)]
@@ -157,6 +171,8 @@ pub struct Drawn {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     /// ∫ g cos θ dΩ over facets, by slopes.
@@ -193,6 +209,30 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn what_is_seen_through_a_surface_is_the_mean_over_the_heights_of_its_facets() {
+        // Facets at the height of share t of all are seen with t^a from above and (1 − t)^b from below.
+        for (a, b) in [(0.0, 0.0), (0.4, 0.0), (2.5, 0.7), (0.01, 30.0)] {
+            let n = 400_000;
+            let sum: f64 = (0..n)
+                .map(|k| {
+                    // Finer towards both ends, where there are roots.
+                    let u = (f64::from(k) + 0.5) / f64::from(n);
+                    let t = u * u * (3.0 - 2.0 * u);
+                    t.powf(a) * (1.0 - t).powf(b) * 6.0 * u * (1.0 - u)
+                })
+                .sum();
+            let found = Facets::seen_through(0.5, 0.25, [0.5 * a, 0.25 * b]);
+            assert!((found / (sum / f64::from(n)) - 1.0).abs() < 1e-8, "{a} {b} {found}");
+        }
+        // Along the surface hardly anything is seen: 1/(1 + a) if nothing is hidden of the other direction.
+        for a in [1e3, 1e5, 1e7] {
+            let found = Facets::seen_through(1e-6, 1.0, [1e-6 * a, 0.0]);
+            assert!((found * (1.0 + a) - 1.0).abs() < 1e-6, "{a} {found}");
+        }
+        assert!(Facets::seen_through(0.0, 1.0, [1.0, 0.5]) < 1e-8);
     }
 
     #[test]

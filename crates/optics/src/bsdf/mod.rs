@@ -13,6 +13,7 @@ mod cosine_power;
 mod drawn;
 #[cfg(test)]
 mod examples;
+mod facet_lattice;
 mod facets;
 mod gauss;
 mod interface;

@@ -16,6 +16,7 @@ use etendue_sampling::warp::part_of;
 
 use super::albedo::{Albedo, ByHeight, LOWEST};
 use super::contract::{Bsdf, Facts, Media, Parameters, by_cosine};
+use super::facet_lattice::{FacetLattice, mirrored, refracted};
 use super::facets::Facets;
 use super::shares::Shares;
 use crate::fresnel::fresnel;
@@ -23,37 +24,6 @@ use crate::fresnel::fresnel;
 /// Steps of the logarithm of the ratio of indices for which shares are tabled, linear in between, and the largest logarithm.
 const STEP: f64 = 1.0 / 512.0;
 const STEPS: usize = 768;
-
-/// Two neighbours of Fibonacci, the nodes of the quadrature over facets and what spreads them; fewer where azimuth matters.
-const NODES: [[u32; 2]; 2] = [[17_711, 10_946], [6_765, 4_181]];
-
-/// Of facets that light meets once: the integrals of functions of the facet and its chance, over all that it sees.
-///
-/// A lattice of Fibonacci, which does better with edges in unknown places than a product of rules.
-pub fn over_facets<const N: usize>(facets: &Facets, i: Vec3, of: impl Fn(Vec3, f64) -> [f64; N]) -> [f64; N] {
-    let nodes = NODES[usize::from(facets.turns())];
-    let [all, step] = nodes.map(f64::from);
-    let mut sum = [0.0; N];
-    for k in 0..nodes[0] {
-        let turn = (f64::from(k) * step / all + 0.25 / all).fract();
-        // Finer towards both ends, where functions may behave like a root.
-        let u = (f64::from(k) + 0.5) / all;
-        let (height, weight) = (u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u));
-        let drawn = facets.draw(i, [turn, height]);
-        if i.dot(drawn.h) > 0.0 {
-            let more = of(drawn.h, drawn.more);
-            for (sum, more) in sum.iter_mut().zip(more) {
-                *sum += weight * more;
-            }
-        }
-    }
-    sum.map(|s| s / all)
-}
-
-/// A direction mirrored by a facet.
-pub fn mirrored(i: Vec3, h: Vec3) -> Vec3 {
-    h * (2.0 * i.dot(h)) - i
-}
 
 /// A direction as seen from the side of the light, whose normal is +z there.
 pub fn from_side(front: bool, d: Vec3) -> Vec3 {
@@ -109,7 +79,7 @@ impl RoughFacets {
         if f.reflectance >= 1.0 {
             return 0.0;
         }
-        let o = Self::refracted(i, h, cosine, f.cosine, ratio);
+        let o = refracted(i, h, cosine, f.cosine, ratio);
         if o.z >= 0.0 {
             return 0.0;
         }
@@ -118,25 +88,12 @@ impl RoughFacets {
         (1.0 - f.reflectance) * more * seen / i.z
     }
 
-    fn refracted(i: Vec3, h: Vec3, cosine: f64, across: f64, ratio: f64) -> Vec3 {
-        let o = h * (cosine / ratio - across) - i * ratio.recip();
-        o * o.length().recip()
-    }
-
     fn known(&self, step: usize) -> &Known {
         self.tables[step].get_or_init(|| {
             let ratio = exp((step as f64 - STEPS as f64) * STEP);
-            let facets = &self.facets;
-            let albedo = Albedo::new(facets.turns(), |d| {
-                let i = above(true, d);
-                let share = |h, more, way| {
-                    if way && !self.through {
-                        0.0
-                    } else {
-                        Self::one_way(facets, i, h, more, ratio, way)
-                    }
-                };
-                let shares = over_facets(facets, i, |h, more| [false, true].map(|way| share(h, more, way)));
+            let lattice = FacetLattice::new(self.facets);
+            let albedo = Albedo::new(self.facets.turns(), |d| {
+                let shares = lattice.reflected_and_transmitted(above(true, d), ratio, self.through);
                 // The quadrature may find more than 1 by its error.
                 let scale = 1.0 / f64::max(1.0, shares[0] + shares[1]);
                 shares.map(|share| share * scale)
@@ -228,7 +185,7 @@ impl RoughFacets {
                 && chance * drawn.most < Self::one_way(&self.facets, i, h, drawn.more, ratio, through)
             {
                 return Some(if through {
-                    Self::refracted(i, h, cosine, fresnel(cosine, 1.0, ratio).cosine, ratio)
+                    refracted(i, h, cosine, fresnel(cosine, 1.0, ratio).cosine, ratio)
                 } else {
                     mirrored(i, h)
                 });

@@ -11,10 +11,11 @@ use etendue_math::Vec3;
 use etendue_sampling::more_numbers::MoreNumbers;
 use etendue_sampling::warp::part_of;
 
-use super::albedo::Albedo;
+use super::albedo::{Albedo, at_nodes};
 use super::contract::{Bsdf, Facts, Media, Parameters, by_cosine};
+use super::facet_lattice::{FacetLattice, mirrored};
 use super::facets::Facets;
-use super::rough_interface::{above, from_side, mirrored, over_facets};
+use super::rough_interface::{above, from_side};
 use super::shares::Shares;
 use crate::table::Table;
 
@@ -43,28 +44,28 @@ impl RoughMetal {
         if !Table::are_shares(std::slice::from_ref(&reflectance)) {
             return Err("a reflectance that is not from 0 to 1".into());
         }
-        let of = |at: &(dyn Fn(f64) -> f64 + Sync)| {
-            Albedo::new(facets.turns(), |d| {
-                let i = above(true, d);
-                let [share] = over_facets(&facets, i, |h, more| {
-                    let o = mirrored(i, h);
-                    if o.z > 0.0 {
-                        let hidden = [facets.hidden(i), facets.hidden(o)];
-                        [at(i.dot(h)) * more * o.z * Facets::seen_by_both(i.z, o.z, hidden)]
-                    } else {
-                        [0.0]
-                    }
-                });
-                // The quadrature may find more than 1 by its error.
-                [share.min(1.0)]
-            })
-        };
-        let perfect = of(&|_| 1.0);
+        let lattice = FacetLattice::new(facets);
         let [_, wavelengths] = Table::breakpoints(std::slice::from_ref(&reflectance));
-        let once = wavelengths.iter().map(|w| {
-            let at = |cosine: f64| reflectance.at(cosine.min(1.0), *w);
-            (of(&at), mean_of(&at))
+        // A perfect reflector first, then the metal at each wavelength.
+        let shares = at_nodes(facets.turns(), |d| {
+            let (mut cosines, mut facet_shares) = (Vec::new(), Vec::new());
+            lattice.mirrors(above(true, d), &mut cosines, &mut facet_shares);
+            let mut sums = vec![0.0; 1 + wavelengths.len()];
+            for (cosine, share) in cosines.iter().zip(&facet_shares).filter(|(_, share)| **share > 0.0) {
+                let (perfect, metal) = sums.split_at_mut(1);
+                perfect[0] += share;
+                reflectance.add_all(cosine.min(1.0), *share, metal);
+            }
+            // The quadrature may find more than 1 by its error.
+            sums.into_iter().map(|sum| sum.min(1.0)).collect::<Vec<_>>()
         });
+        let albedo = |k: usize| {
+            let row = |row: &Vec<Vec<f64>>| row.iter().map(|sums| [sums[k]]).collect();
+            Albedo::from_nodes(shares.iter().map(row).collect())
+        };
+        let perfect = albedo(0);
+        let metal = wavelengths.iter().zip(1..);
+        let once = metal.map(|(w, k)| (albedo(k), mean_of(&|cosine: f64| reflectance.at(cosine.min(1.0), *w))));
         let once = once.collect();
         Ok(Self {
             facets,
