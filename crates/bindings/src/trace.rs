@@ -203,13 +203,13 @@ type Looks<'py> = (
     Bound<'py, PyArray3<f64>>,
     Bound<'py, PyArray3<f64>>,
     Bound<'py, PyArray3<f64>>,
-    f64,
+    (f64, f64),
 );
 
 /// Looks at a scene: for each of the passes `first..last` and each pixel, row by row, the mean luminance, the part of it that
 /// is found by chance, and the sources' own deviation \[flux unit/(mm² sr)\]; and the shares of the lines that meet a smooth
 /// surface first, and that see a diffuse one directly. Beside them the sum over passes and pixels of the mean weight that
-/// lines still had when they were given up, having met as many surfaces as they may.
+/// lines still had when they were given up, having met as many surfaces as they may, and when they were lost.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
 #[pyo3(signature = (scene, view, paths, seed, most_events, left, first, last, threads=None, survey=None, shared=None, guide=None, glints=None))]
@@ -269,14 +269,14 @@ pub fn look_at_scene<'py>(
         }
         Ok(array)
     };
-    let given_up = image.pixels.iter().map(|p| p.given_up).sum();
+    let sum = |of: fn(&Pixel) -> f64| image.pixels.iter().map(of).sum();
     Ok((
         array(|p| p.mean)?,
         array(|p| p.chance)?,
         array(|p| p.deviation)?,
         array(|p| p.met[0])?,
         array(|p| p.met[1])?,
-        given_up,
+        (sum(|p| p.given_up), sum(|p| p.lost)),
     ))
 }
 

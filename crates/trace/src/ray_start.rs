@@ -28,6 +28,35 @@ pub fn place(scene: &Scene, o: Vec3, d: Vec3) -> Result<(SolidStack, OriginFaces
     start.settled(scene)
 }
 
+/// The solids that an observer is in who looks at `target`, and the faces that the observer is on.
+///
+/// Views are often aimed at an edge or a corner, and of two faces that meet there a line may cross one and miss the other. So
+/// lines beside that one are asked, and what most of them say counts.
+///
+/// # Errors
+/// If most of them say that the observer is in more than four solids.
+pub fn place_observer(scene: &Scene, o: Vec3, target: Vec3) -> Result<(SolidStack, OriginFaces), (Loss, u32)> {
+    let toward = (target - o).normalized();
+    let answers = BESIDE.map(|off| place(scene, o, (toward + off).normalized()));
+    let mut best = answers[0];
+    let votes = |answer| answers.iter().filter(|other| **other == answer).count();
+    for answer in &answers[1..] {
+        if votes(*answer) > votes(best) {
+            best = *answer;
+        }
+    }
+    best
+}
+
+/// How directions differ from that in which an observer looks: about a degree, and none along what scenes are built along.
+const BESIDE: [Vec3; 5] = [
+    Vec3::new(0.0137, -0.0059, 0.0083),
+    Vec3::new(-0.0071, 0.0149, 0.0031),
+    Vec3::new(-0.0043, -0.0107, -0.0131),
+    Vec3::new(0.0097, 0.0023, -0.0151),
+    Vec3::new(0.0029, 0.0113, 0.0127),
+];
+
 /// As [`place`], for a ray that can start only on or in what the faces in `near` say.
 ///
 /// # Errors

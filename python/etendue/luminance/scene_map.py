@@ -57,7 +57,7 @@ MOST_EVENTS = 10_000
 """Surfaces that a line of sight may meet."""
 
 GIVEN_UP = 1e-4
-"""Share of the weight of all lines that may be given up without a word."""
+"""Share of the weight of all lines that may be given up, or lost, without a word."""
 
 
 class SeenScene:
@@ -121,7 +121,7 @@ def look_at_scene(
     surveys = _Surveys(core, compiled.record, how.seed, threads)
     maps, done = [], 0
     for number, ((observer, screen), view, small) in enumerate(zip(pairs, views, forward.plan.glints, strict=True)):
-        given_up = 0.0
+        given_up = lost = 0.0
 
         def look(
             first: int,
@@ -130,12 +130,13 @@ def look_at_scene(
             view: _core._View = view,
             small: _core.Glints = small,
         ) -> list[list[Array]]:
-            nonlocal given_up
+            nonlocal given_up, lost
             guides = forward.shared, forward.plan.guide, small
-            *found, weight = _core.look_at_scene(
+            *found, weights = _core.look_at_scene(
                 core, view, how.paths, how.seed, MOST_EVENTS, left, first, last, threads, known, *guides
             )
-            given_up = max(given_up, weight / ((last - first) * view["columns"] * view["rows"]))
+            ended = np.array(weights) / ((last - first) * view["columns"] * view["rows"])
+            given_up, lost = np.maximum((given_up, lost), ended).tolist()
             return [list(sums) for sums in zip(*found, strict=True)]
 
         def advance(passes: int, lines: int = how.paths * screen.columns * screen.rows) -> None:
@@ -169,6 +170,12 @@ def look_at_scene(
             told.append(
                 f"lines of sight that met {MOST_EVENTS:,} surfaces were given up; they had {given_up:.2g} of the weight of "
                 "all lines left: the map is too low by what they would still have seen, and no error says so"
+            )
+        if lost > GIVEN_UP:
+            told.append(
+                f"lines of sight with {lost:.2g} of the weight of all were lost: they met faces that contradict the solids they "
+                "came from, as at edges and where solids are not closed or reach into each other, or were in more than four solids "
+                "at once; the map is too low by what they would have seen, and no error says so"
             )
         if image is not None:
             told.append(image.note)

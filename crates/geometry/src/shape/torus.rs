@@ -14,6 +14,9 @@ pub struct Torus {
     pub minor: f64,
 }
 
+/// By how much the ball is larger in which crossings are looked for: F there is 8 R³ r of this, and known to some 10⁻¹⁵ R⁴.
+const MARGIN: f64 = 1e-6;
+
 /// F = (|p|² + R² − r²)² − 4 R² (x² + y²) along a line, a polynomial of fourth order: Σ cᵢ tⁱ.
 struct Along([f64; 5]);
 
@@ -51,10 +54,11 @@ impl Bounded for Along {
 impl Torus {
     /// Calls `visit` for each distance in `range` at which the line crosses the surface.
     pub fn crossings(&self, o: Vec3, d: Vec3, range: [f64; 2], starts_on: bool, mut visit: impl FnMut(f64)) {
-        // From the point nearest the origin; beyond the ball that holds the torus there is nothing.
+        // From the point nearest the origin; beyond the ball that holds the torus there is nothing. The ball is larger by as much
+        // as F, a difference of numbers of the order of R⁴, needs to have the right sign at its ends.
         let middle = -o.dot(d);
         let near = o + d * middle;
-        let reach = self.major + self.minor + ROUNDING * (size(o) + middle.abs());
+        let reach = (self.major + self.minor) * (1.0 + MARGIN) + ROUNDING * (size(o) + middle.abs());
         let half = reach * reach - near.dot(near);
         if half < 0.0 {
             return;

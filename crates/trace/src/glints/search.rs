@@ -19,7 +19,7 @@ use super::targets::Target;
 use crate::interaction::{Interaction, first_interaction};
 use crate::lit_scene::LitScene;
 use crate::medium_cache::MediumCache;
-use crate::ray_start::place;
+use crate::ray_start::place_observer;
 use crate::scatter::SPLIT;
 use crate::scene::Scene;
 use crate::solid_stack::SolidStack;
@@ -97,7 +97,7 @@ pub struct Search<'a> {
 impl<'a> Search<'a> {
     /// None if there is nothing to look for.
     pub fn new(lit: &'a LitScene<'a>, view: &'a View, most_events: u32, targets: &'a [Target]) -> Option<Self> {
-        let observer = place(lit.scene, view.observer, (view.target - view.observer).normalized()).ok()?;
+        let observer = place_observer(lit.scene, view.observer, view.target).ok()?;
         let n = lit.lines.len();
         let colours = n.min(COLOURS);
         // In the middle of each of as many parts of the light.

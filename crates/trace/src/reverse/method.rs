@@ -49,4 +49,6 @@ pub struct Pixel {
     pub met: [f64; 2],
     /// Mean weight that lines still had when they had met as many surfaces as they may and were given up.
     pub given_up: f64,
+    /// Mean weight of lines that were lost, as the solids they were in contradict the faces they met.
+    pub lost: f64,
 }

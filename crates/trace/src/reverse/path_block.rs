@@ -15,7 +15,7 @@ use crate::exitance::ExitanceCache;
 use crate::interaction::Interaction;
 use crate::lit_scene::LitScene;
 use crate::medium_cache::MediumCache;
-use crate::ray_start::place;
+use crate::ray_start::place_observer;
 use crate::solid_stack::SolidStack;
 
 /// What a branch has seen on its way from the observer.
@@ -51,6 +51,9 @@ pub(super) struct Branch {
     pub(super) ways: u32,
     /// On one of 2^`thinned` lines of sight it is followed, for all of them.
     pub(super) thinned: u8,
+    /// Sources no farther along its line were met on the way to where it starts. Of single precision, as branches are the size of
+    /// a line of the cache so.
+    pub(super) behind: f32,
 }
 
 impl Branch {
@@ -115,7 +118,9 @@ pub(super) struct Path {
     /// Of the light, that which was found by chance.
     pub(super) chance: f64,
     /// Weight of its branches that met more surfaces than they may.
-    pub(super) given_up: f64,
+    pub(super) given_up: f32,
+    /// Weight of its branches that were lost, as the solids they were in contradict the faces they met.
+    pub(super) lost: f32,
     /// How much a small image of a source counts, as paths of both kinds find it.
     pub(super) share: f64,
 }
@@ -185,7 +190,7 @@ impl<'a> PathBlock<'a> {
             reader: SightReader::default(),
             shadows: RayBlock::default(),
             connections: Vec::new(),
-            observer: place(lit.scene, view.observer, (view.target - view.observer).normalized()).ok(),
+            observer: place_observer(lit.scene, view.observer, view.target).ok(),
         }
     }
 

@@ -125,7 +125,7 @@ impl<'a> Renderer<'a> {
 
     /// The passes of pixels of some numbers, pixel by pixel.
     fn paint(&mut self, which: &[usize], passes: Range<u32>, pixels: &mut [Pixel]) {
-        let mut cells = vec![[0.0; 6]; which.len() * passes.len()];
+        let mut cells = vec![[0.0; 7]; which.len() * passes.len()];
         let all: Vec<usize> = (0..cells.len()).collect();
         self.look(&all, which, &passes, false, &mut cells);
         // Once more those with small images of sources.
@@ -134,19 +134,20 @@ impl<'a> Renderer<'a> {
             let those: Vec<usize> = all.into_iter().filter(has).collect();
             self.look(&those, which, &passes, true, &mut cells);
         }
-        for (pixel, [mean, deviation, chance, smooth, diffuse, given_up]) in pixels.iter_mut().zip(cells) {
+        for (pixel, [mean, deviation, chance, smooth, diffuse, given_up, lost]) in pixels.iter_mut().zip(cells) {
             *pixel = Pixel {
                 mean,
                 chance,
                 deviation,
                 met: [smooth, diffuse],
                 given_up,
+                lost,
             };
         }
     }
 
     /// Adds the paths of some cells, each a pass of a pixel.
-    fn look(&mut self, tasks: &[usize], which: &[usize], passes: &Range<u32>, aimed: bool, cells: &mut [[f64; 6]]) {
+    fn look(&mut self, tasks: &[usize], which: &[usize], passes: &Range<u32>, aimed: bool, cells: &mut [[f64; 7]]) {
         let paths = paths_of(self.block.method, aimed) as usize;
         let share = 1.0 / f64::from(self.block.method.paths);
         let total = tasks.len() * paths;
@@ -174,7 +175,9 @@ impl<'a> Renderer<'a> {
                 let of_cell = end.min((task + 1) * paths) - begin.max(task * paths);
                 for path in found.split_off(..of_cell).unwrap_or_default() {
                     let [smooth, diffuse] = path.met.map(|met| if met { 1.0 } else { 0.0 });
-                    let values = [path.sum[0], path.sum[1], path.chance, smooth, diffuse, path.given_up];
+                    let [mean, deviation] = path.sum;
+                    let [given_up, lost] = [path.given_up, path.lost].map(f64::from);
+                    let values = [mean, deviation, path.chance, smooth, diffuse, given_up, lost];
                     for (sum, value) in sums.iter_mut().zip(values) {
                         *sum += value * share;
                     }
@@ -215,6 +218,7 @@ impl<'a> Renderer<'a> {
             sum: [0.0; 2],
             chance: 0.0,
             given_up: 0.0,
+            lost: 0.0,
             share: 1.0,
         };
         block.passes.push(pass);
@@ -284,9 +288,14 @@ impl<'a> Renderer<'a> {
                 density: 0.0,
                 ways: glints::STRAIGHT,
                 thinned: 0,
+                behind: 0.0,
             };
             let branches = starts.paths.iter().map(|path| Branch { path: *path, ..branch });
             block.branches.extend(branches);
+        } else {
+            for path in &mut block.paths {
+                path.lost += 1.0;
+            }
         }
         starts.places.iter_mut().for_each(Vec::clear);
         starts.paths.clear();

@@ -1,8 +1,10 @@
 //! One branch meets what it meets: sources on its way, and the surface behind them.
 
-use etendue_geometry::hits::{Hits, TIE};
+use etendue_geometry::hits::Hits;
+use etendue_geometry::shape::size;
 use etendue_geometry::surface_points::fill;
 use etendue_lightfield::carrier::Sights;
+use etendue_math::Vec3;
 
 use super::diffuse::Known;
 use super::method::LeftOut;
@@ -10,6 +12,7 @@ use super::path_block::{Branch, Path, PathBlock, PixelPass, Seen};
 use crate::glints::{Glints, led_on};
 use crate::interaction::interaction_of;
 use crate::scatter::{SPLIT, SurfaceEvent};
+use crate::scene::START;
 
 /// Diffuse scatters before a path may be ended by chance.
 const SURE: u32 = 3;
@@ -22,6 +25,7 @@ const REST: f64 = 4.0;
 const LEAST: f64 = 0.05;
 
 impl PathBlock<'_> {
+    #[allow(clippy::cast_possible_truncation, reason = "weights that are only told of")]
     pub(super) fn step(&mut self, hits: &Hits, i: usize) {
         let scene = self.lit.scene;
         let d = self.lines.direction(i);
@@ -29,6 +33,7 @@ impl PathBlock<'_> {
         let wavelength = self.wavelength(branch.path);
         let absorption = self.media.at(scene, branch.stack.top(), wavelength).absorption;
         let Ok(mut interaction) = interaction_of(scene, &self.lines, hits, i, branch.stack, |_, _, _| {}) else {
+            self.paths[branch.path as usize].lost += branch.weight as f32;
             return;
         };
         interaction.limit_interpolation(branch.events);
@@ -38,14 +43,14 @@ impl PathBlock<'_> {
             branch.weight *= (-absorption * interaction.t).exp();
         }
         if branch.events > self.method.most_events {
-            self.paths[branch.path as usize].given_up += branch.weight;
+            self.paths[branch.path as usize].given_up += branch.weight as f32;
             return;
         }
         if branch.weight == 0.0 {
             return;
         }
         match SurfaceEvent::new(scene, &interaction, d, wavelength, &mut self.media) {
-            Err(_) => {}
+            Err(_) => self.paths[branch.path as usize].lost += branch.weight as f32,
             Ok(Some(event)) => self.surface_event(&branch, &event),
             Ok(None) => {
                 branch.stack = interaction.after;
@@ -55,10 +60,16 @@ impl PathBlock<'_> {
     }
 
     /// Adds the light of sources that branches meet before anything else.
+    #[allow(clippy::cast_possible_truncation, reason = "a length that rounding bounds")]
     pub(super) fn gather(&mut self, hits: &Hits) {
         let scene = self.lit.scene;
-        // A source that lies on the surface behind it is in front of it.
-        fill(&mut self.reach, hits.t.iter().map(|t| t * (1.0 + TIE)));
+        // A source that lies on a surface, but for rounding, is met on the way there and not again on the way from it.
+        let [x, y, z] = &self.lines.origin;
+        let starts = hits.t.iter().zip(x.iter().zip(y).zip(z));
+        fill(
+            &mut self.reach,
+            starts.map(|(t, ((x, y), z))| t + START * (size(Vec3::new(*x, *y, *z)) + t)),
+        );
         let mut before = 0.0;
         for (number, source) in scene.sources.iter().enumerate() {
             let share = self.lit.shares[number] - before;
@@ -106,6 +117,9 @@ impl PathBlock<'_> {
             fill(marked, those.map(|(i, _)| i));
             sampler.along_all(source, sights, marked, reader, |i, hit| {
                 let branch = &branches[i];
+                if hit.t <= f64::from(branch.behind) {
+                    return;
+                }
                 let path = &mut paths[branch.path as usize];
                 let shared = if is_small(branch, path) { path.share } else { 1.0 };
                 let (_, wavelength, colour) = &lit.lines[path.line as usize];
@@ -129,6 +143,9 @@ impl PathBlock<'_> {
                     path.chance += weight * hit.luminance;
                 }
             });
+        }
+        for ((branch, reach), t) in self.branches.iter_mut().zip(&self.reach).zip(&hits.t) {
+            branch.behind = (reach - t) as f32;
         }
     }
 
