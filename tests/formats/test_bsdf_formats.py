@@ -159,6 +159,7 @@ def damage(whole: bytes, tmp_path: Path) -> None:
     check()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_kind_of_scatter_of_tracepro(kind: str, tmp_path: Path) -> None:
     """As the files of all formats: recognised by one, and after damage a BSDF or an error of ours.

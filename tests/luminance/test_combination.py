@@ -10,7 +10,6 @@ from etendue.errors import ArgumentError
 VIEW = (et.Observer(20, 40, 150), et.Screen(70, 50, 14, 10))
 
 
-@pytest.mark.slow
 def test_runs_joined_equal_the_source_with_all_runs() -> None:
     """Second route: the core draws the same rays as one source of three runs, with a third of the flux each."""
     runs = [et.luminance_map(et.RingSource(rays=300_000, seed=s), *VIEW, method="cone") for s in (5, 6, 7)]

@@ -83,7 +83,6 @@ def test_reflectance_of_metals_is_the_closed_form() -> None:
     assert float(glass.reflectance(math.degrees(math.atan(1.5)))) == pytest.approx(0.5 * (1.25 / 3.25) ** 2, abs=2e-3)
 
 
-@pytest.mark.slow
 def test_brushed_metal_is_wide_across_its_axis() -> None:
     metal = et.bsdf.RoughMetal(roughness=0.05, roughness_across=0.4, reflectance=1.0)
     normal, tilt = [0.0, 0.0, 1.0], math.sin(math.radians(20.0))

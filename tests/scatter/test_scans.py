@@ -189,7 +189,6 @@ def test_natural_neighbours_keep_a_plane_and_take_sibsons_areas() -> None:
     assert np.abs(found / plane(at) - 1.0).max() < 0.02
 
 
-@pytest.mark.slow
 def test_turning_the_sample() -> None:
     """Brushed metal differs when it is turned, paint does not; turned on the stage, not in the plane of incidence."""
     brushed = et.bsdf.RoughMetal(roughness=0.3, roughness_across=0.1, reflectance=0.9)

@@ -173,9 +173,9 @@ def look_at_scene(
             )
         if lost > GIVEN_UP:
             told.append(
-                f"lines of sight with {lost:.2g} of the weight of all were lost: they met faces that contradict the solids they "
-                "came from, as at edges and where solids are not closed or reach into each other, or were in more than four solids "
-                "at once; the map is too low by what they would have seen, and no error says so"
+                f"lines of sight with {lost:.2g} of the weight of all were lost: they met faces that contradict the solids "
+                "they came from, as at edges and where solids are not closed or reach into each other, or were in more than "
+                "four solids at once; the map is too low by what they would have seen, and no error says so"
             )
         if image is not None:
             told.append(image.note)

@@ -107,7 +107,8 @@ ADDITIONS: dict[str, Addition] = {
         (
             Insertion(
                 SCENES_PAGE,
-                "| `transmitter` | `transmittance` | light goes straight on; between media of unlike index by Snell's law, with total reflection |\n",
+                "| `transmitter` | `transmittance` | light goes straight on; between media of unlike index by Snell's law, "
+                "with total reflection |\n",
                 "| `minnaert` | `reflectance`, `exponent` | diffuse reflection, the weaker the more along the surface |\n",
             ),
         ),
