@@ -14,7 +14,10 @@
    (`scalar_rgb`, `path`), and its light image beside `ptracer`: 1/(variance · time), the variance that of a pixel over
    independent runs.
 
-python benchmarks/scatter.py [--rays 1e6] [--only table] [--peers]
+4. With `--set-up`, in place of all that: how long rough surfaces take to answer for the first time, alike along and across
+   and not, and a metal whose reflectance is known at 41 wavelengths beside the same at one.
+
+python benchmarks/scatter.py [--rays 1e6] [--only table] [--peers] [--set-up]
 """
 
 from __future__ import annotations
@@ -280,6 +283,35 @@ def chambers(scenes: Mapping[str, et.Scene], rays: int) -> dict[str, Array]:
     return {name: np.array(times) for name, times in found.items()}
 
 
+def set_up() -> None:
+    """Processor seconds until a rough surface first tells what it reflects."""
+
+    def seconds(bsdf: et.Bsdf) -> float:
+        begun = time.process_time()
+        bsdf.reflectance(10.0, media=(1.0, 1.5))
+        return time.process_time() - begun
+
+    made: dict[str, Callable[..., et.Bsdf]] = {
+        "rough-metal": lambda **facets: et.bsdf.RoughMetal(index=0.96, extinction=6.69, **facets),
+        "rough-coat": lambda **facets: et.bsdf.RoughCoat(index=1.5, base_reflectance=0.8, **facets),
+        "rough-interface": et.bsdf.RoughInterface,
+    }
+    for distribution in ("ggx", "beckmann"):
+        for kind, make in made.items():
+            alike = seconds(make(distribution=distribution, roughness=0.4))
+            unlike = seconds(make(distribution=distribution, roughness=0.4, roughness_across=0.2))
+            row(f"set-up of {kind}, {distribution}, alike, unlike", f"{alike:.2f}, {unlike:.2f} s")
+    metals = {}
+    for count in (1, 41):
+        colours = {"wavelength": np.linspace(400, 700, count).tolist(), "values": np.linspace(0.8, 0.9, count).tolist()}
+        metals[count] = seconds(et.bsdf.RoughMetal(roughness=0.4, roughness_across=0.2, reflectance=colours))
+    row(
+        "set-up of a metal of unlike roughness, 41 wavelengths",
+        f"{metals[41]:.2f} s",
+        f"{metals[41] / metals[1]:.1f} × that of one",
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rays", type=float, default=1e6)
@@ -287,7 +319,11 @@ def main() -> None:
         "--only", default="", help="some of the surfaces, as 'table,coated'; the Lambertian one is always there"
     )
     parser.add_argument("--peers", action="store_true", help="beside Radiance and Mitsuba")
+    parser.add_argument("--set-up", action="store_true", help="set-up of rough surfaces alone")
     given = parser.parse_args()
+    if given.set_up:
+        set_up()
+        return
     rays = int(given.rays)
 
     measured = table()
