@@ -280,7 +280,6 @@ def public_things() -> Iterator[tuple[str, ast.FunctionDef | ast.ClassDef]]:
             yield f"{module.name}.{node.name}", node
 
 
-@pytest.mark.slow
 def test_everything_public_is_explained_and_shown() -> None:
     things = dict(public_things())
     assert len(things) > 100

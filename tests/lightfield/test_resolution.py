@@ -182,6 +182,7 @@ def test_cells_finer_than_the_rays_are_told() -> None:
     assert "cells of 0.1 mm would be more than there are rays: they have 0.375 mm" in field.notes
 
 
+@pytest.mark.slow
 def test_spots_finer_than_the_cells_that_are_asked_for_are_lost() -> None:
     rays = spotted(pitch=1.0, seed=5)
     shown = [

@@ -47,6 +47,7 @@ SLOW_EXAMPLES: frozenset[str] = frozenset(
         "etendue.lightfield.focusing.focused",
         "etendue.lightfield.light_field.LightField",
         "etendue.lightfield.light_field.LightField.intensity",
+        "etendue.lightfield.resolution.resolution",
         "etendue.lightfield.selection.search.choose_surface",
         "etendue.luminance.denoising.denoise_map",
         "etendue.luminance.methods.FromField",
@@ -57,7 +58,6 @@ SLOW_EXAMPLES: frozenset[str] = frozenset(
         "etendue.plot.near_field_picture.plot_near_field",
         "etendue.plot.report_page.plot_report",
         "etendue.plot.report_page.report_html",
-        "etendue.scatter.models.rough.RoughInterface",
     }
 )
 """Docstrings whose examples are slow."""

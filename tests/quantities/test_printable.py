@@ -13,6 +13,7 @@ OBEYED = ("Cc", "Cf", "Cs", "Co", "Zl", "Zp")
 """Categories of characters that a terminal acts on, or that are not seen."""
 
 
+@pytest.mark.slow
 @given(st.text() | st.text(st.characters(categories=OBEYED)))
 def test_nothing_remains_that_a_terminal_obeys(text: str) -> None:
     shown = printable(text)
