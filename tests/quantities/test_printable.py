@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import unicodedata
 
+import pytest
 from etendue.quantities.printable import printable
 from hypothesis import given
 from hypothesis import strategies as st
