@@ -5,7 +5,6 @@ from __future__ import annotations
 import codecs
 import unicodedata
 
-import pytest
 from etendue.quantities.printable import printable
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,7 +13,6 @@ OBEYED = ("Cc", "Cf", "Cs", "Co", "Zl", "Zp")
 """Categories of characters that a terminal acts on, or that are not seen."""
 
 
-@pytest.mark.slow
 @given(st.text() | st.text(st.characters(categories=OBEYED)))
 def test_nothing_remains_that_a_terminal_obeys(text: str) -> None:
     shown = printable(text)
