@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from etendue.luminance.caustics import Forward, at_least_nearby
+from etendue.luminance.caustics import FEW, Forward, at_least_nearby
 from etendue.luminance.gathering import blocks
 from etendue.quantities.relative_error import RelativeError
 
@@ -60,6 +60,7 @@ class Passes:
         self._all = _Spread(part)
         self._chance = _Spread(part)
         self._lucky = np.zeros(part, dtype=np.int64)
+        self._lit = np.zeros(part, dtype=np.int64)
         self._smooth = np.zeros(part, dtype=bool)
         self._diffuse = np.zeros(part, dtype=bool)
         self._deviation = np.zeros(part)
@@ -77,6 +78,7 @@ class Passes:
             sums[self._window] for sums in (values, chance, deviation, smooth, diffuse)
         )
         self._all.add(values, self.done)
+        self._lit += values > 0.0
         # Of nothing so far, nothing more changes neither mean nor spread.
         if chance.any() or self._lucky.any():
             self._chance.add(chance, self.done)
@@ -89,10 +91,16 @@ class Passes:
     def total(self, image: Forward | None, *, known: bool = True) -> tuple[Array, Array]:
         """The luminance of both routes and its standard error; with what the sources know of their own, if `known`.
 
-        What is found by chance, in few passes of a pixel, errs by no less than in its neighbourhood.
+        What is found by chance, in few passes of a pixel, errs by no less than in its neighbourhood; so does all light of a
+        pixel that sees a diffuse surface and found light in few passes.
         """
-        chance = self._chance.variance(self.done)
-        variance = self._all.variance(self.done) + (at_least_nearby(chance, self._lucky, self._smooth) - chance)
+        chance, found = self._chance.variance(self.done), self._all.variance(self.done)
+        # Whoever found light in each pass needs no neighbours.
+        lit = np.where(self._lit < self.done, self._lit, FEW)
+        variance = np.maximum(
+            found + (at_least_nearby(chance, self._lucky, self._smooth) - chance),
+            at_least_nearby(found, lit, self._diffuse),
+        )
         if known:
             variance = variance + self._deviation**2
         values = self._whole(self._all.mean)
