@@ -82,7 +82,7 @@ class Rays(Source):
         }
         unit = self.flux_unit if self.flux_unit is not None else rays.flux_unit
         emitter = self._coloured(record, rays, unit)
-        return (dataclasses.replace(emitter, notes=(*emitter.notes, *rays.notes, *_told_of_copies(distinct))),)
+        return (dataclasses.replace(emitter, notes=(*emitter.notes, *_told_of_copies(distinct))),)
 
     def ray_stream(self, files: Files) -> RayStream:
         """The rays, in the unit that is asked for if their spectrum is known.
