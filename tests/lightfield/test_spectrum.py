@@ -235,3 +235,43 @@ def test_watts_of_unknown_colour_are_told_of() -> None:
     told = "led: its watts have no known wavelength; 555 nm is taken, which decides what they are in lumens"
     assert told in et.trace(et.Scene(sources=[source]), None).notes
     assert told not in et.trace(et.Scene(sources=[source], wavelength=600), None).notes
+
+
+def test_scenes_say_what_a_field_says_of_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lines that pass its sphere, counted by their distance from its middle, and one efficacy for two colours.
+
+    Blue light goes up and red light down, so that lumens in proportion to watts are wrong on either side. What a map
+    fits to rays by itself is no other field.
+    """
+    rng = np.random.default_rng(4)
+    place, k = 0.2 * rng.normal(size=(4000, 3)), rng.normal(size=(4000, 3))
+    k /= np.linalg.norm(k, axis=1)[:, None]
+    missing = int((np.linalg.norm(np.cross(place, k), axis=1) > 0.5).sum())
+    red = float((k[:, 2] < 0).mean())
+    sided = et.RaySet(
+        place, k, np.full(4000, 1 / 4000), flux_unit="W", wavelength=np.where(k[:, 2] < 0, LINES[2], LINES[0])
+    )
+    sphere = et.Sphere(radius=0.5, centre=(0.0, 0.0, 0.0))
+    mixed = LightField.fit(sided, sphere, depths=(2, 2, 2, 2))
+    lost = f"led: {missing} of 4,000 rays ({missing / 4000:.3%} of the flux) do not meet"
+    efficacy = 683.0 * float(photopic_efficiency(LINES[[0, 2]]) @ [1 - red, red])
+    tolerance = 3.9 * 683.0 * np.sqrt(0.25 / 4000)  # the field knows the colours of the rays that meet it alone
+
+    def told(source: dict[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        scene = et.Scene(sources=[{"name": "led", **source}])
+        seen = et.luminance_map(scene, et.Observer(0, 0, 100), et.Screen(1, 1, 2, 2), rays_per_pixel=4)
+        return et.trace(scene, 1000).notes, seen.notes
+
+    for notes in told({"kind": "light-field", "field": mixed}):
+        assert sum(note.startswith(lost) for note in notes) == 1
+        assert not any("convert the rays" in note for note in notes)
+    for notes in told({"kind": "light-field", "field": mixed, "flux_unit": "lm"}):
+        (spread,) = (note for note in notes if "which all rays have together" in note)
+        assert float(spread.split(" by ")[1].split(" lm/W")[0]) == pytest.approx(efficacy, abs=tolerance)
+    for notes in told({"kind": "light-field", "field": mixed, "flux_unit": "lm", "flux": 100}):
+        assert any("the stated lm are spread as the field's W are" in note for note in notes)
+    for notes in told({"kind": "light-field", "field": mixed, "flux_unit": "lm", "flux": 100, "wavelength": 550}):
+        assert not any("convert the rays" in note for note in notes)
+    monkeypatch.setattr(scene_map, "fit_or_recall", lambda rays, **_: LightField.fit(rays, sphere, depths=(2, 2, 2, 2)))
+    _, notes = told({"kind": "rays", "rays": sided})
+    assert sum(note.startswith(lost) for note in notes) == 1

@@ -229,6 +229,18 @@ def test_collected_rays_tell_that_they_are_copies(tmp_path: Path) -> None:
     assert not any("copies" in c.found for c in own.complaints)
 
 
+def test_a_trace_of_collected_rays_tells_that_they_are_copies() -> None:
+    """100 copies of each of 50 rays: errors made as if all were independent are up to √100 times too small."""
+    ball = {"kind": "rays", "name": "ball", "shape": {"kind": "sphere", "radius": 1e3}}
+    source = {"kind": "rays", "name": "led", "rays": lopsided(50, 1)}
+    copies = et.trace(et.Scene(sources=[source], detectors=[ball]), 5000, 3).rays["ball"]
+    for rays, times in ((copies, 1), (lopsided(50, 1), 0)):
+        notes = et.trace(et.Scene(sources=[{**source, "rays": rays}]), None).notes
+        told = [note for note in notes if "copies of one ray of a set" in note]
+        assert len(told) == times
+        assert all(note.startswith("led: up to 100 ") and "up to 10 times" in note for note in told)
+
+
 # --- coverage ----------------------------------------------------------------------------------------------------------
 
 RADIUS, REFLECTANCE = 40.0, 0.6

@@ -14,7 +14,6 @@ from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.lightfield.light_field import LightField
-from etendue.lightfield.narrow_beams import told_of_narrow_beams
 from etendue.luminance.caustics import Forward, LightImages, Plan, plan
 from etendue.luminance.gathering import (
     FIRST_CHECK,
@@ -390,8 +389,8 @@ def with_fields(
         sources.append(seen)
         lost = f"; {share:.2%} of the flux does not come from it" if share > 1e-4 else ""
         notes.append(f"{name}: a light field on {field.surface.told} was fitted to its rays{lost}")
-        blurred = told_of_narrow_beams(field.parts, field.part_flux)
-        notes += [f"{name}: {note}" for note in (*blurred, *(source.rays.notes if source.rays is not None else ()))]
+        # What the field says of itself is in the notes of the scene with it.
+        notes += [f"{name}: {note}" for note in (() if source.rays is None else source.rays.notes)]
     return scene.replace(sources=tuple(sources)), notes
 
 

@@ -82,7 +82,7 @@ class Rays(Source):
         }
         unit = self.flux_unit if self.flux_unit is not None else rays.flux_unit
         emitter = self._coloured(record, rays, unit)
-        return (dataclasses.replace(emitter, notes=(*emitter.notes, *_told_of_copies(distinct))),)
+        return (dataclasses.replace(emitter, notes=(*emitter.notes, *rays.notes, *_told_of_copies(distinct))),)
 
     def ray_stream(self, files: Files) -> RayStream:
         """The rays, in the unit that is asked for if their spectrum is known.
@@ -181,19 +181,26 @@ class Field(Source):
         return self
 
     def emitters(self, files: Files) -> tuple[Emitter, ...]:
-        """The field, its flux and its spectrum."""
+        """The field, its flux, its spectrum and its notes."""
         field = self._field(files)
         if not field.total_flux > 0.0:
             raise ArgumentError("the light field carries no flux")
         unit = field.flux_unit if self.flux_unit is None else self.flux_unit
-        flux = self.flux
+        flux, told = self.flux, list[str]()
+        if flux is not None and unit != field.flux_unit and field.spectrum_is_mean and not self.states_colours:
+            told.append(
+                f"the stated {unit} are spread as the field's {field.flux_unit} are; where the colour of its rays changes "
+                "with place or direction, convert the rays before the fit"
+            )
         if flux is None and unit != field.flux_unit and field.spectrum is None and self.states_colours:
             flux = self.stated_in_unit(field.total_flux, unit)
         elif flux is None:
             field = field.in_unit(unit)
             flux = field.total_flux
         mean = field.spectrum_is_mean and not self.states_colours
-        return (Emitter({"kind": "field", "field": field.core, "flux": flux}, unit, field.spectrum, mean=mean),)
+        record = {"kind": "field", "field": field.core, "flux": flux}
+        # What a field says of itself, as of rays that it lacks or of beams that it blurs, is true of all that it lights.
+        return (Emitter(record, unit, field.spectrum, notes=(*field.notes, *told), mean=mean),)
 
     def some_rays(self, files: Files, most: int) -> RaySet:
         """Rays drawn from it."""
