@@ -137,6 +137,31 @@ def test_a_few_strays_do_not_blow_a_plane_up() -> None:
 
 
 @pytest.mark.parametrize(
+    "spec", ["plane:width=2.5", "plane:height=1.5", "plane:width=2,height=1", "box:width=2,height=1"]
+)
+def test_a_surface_of_stated_size_lies_where_most_light_is(spec: str) -> None:
+    """A bright die of 2 × 1 mm at (3, -1), and beside it, over ten times its size, half as much light in as many rays."""
+    rng = np.random.default_rng(5)
+    n = 20_000
+    die = np.column_stack([rng.uniform(2, 4, n), rng.uniform(-1.5, -0.5, n)])
+    wide = rng.uniform(-10, 20, (n, 2))
+    rays = et.RaySet(
+        np.column_stack([np.vstack([die, wide]), np.zeros(2 * n)]),
+        np.tile([0, 0, 1.0], (2 * n, 1)),
+        np.repeat([2.0, 1.0], n),
+    )
+    sized = et.parse_surface(spec).sized_for(rays)
+    assert isinstance(sized, et.Plane | et.Box)
+    assert sized.centre is not None
+    for name, c, of_die, of_all, size in zip(("width", "height"), sized.centre, (3, -1), (5, 5), (2, 1), strict=False):
+        # The die is found to where its outermost rays, or those beside it, lie: some of 1e4 per mm.
+        expected, room = (
+            (of_all, 0.02) if f"{name}=" not in spec else (of_die, getattr(sized, name) / 2 - size / 2 + 0.01)
+        )
+        assert abs(c - expected) <= room
+
+
+@pytest.mark.parametrize(
     ("make", "message"),
     [
         (lambda: et.Plane(width=-1), "length above 0"),

@@ -331,7 +331,7 @@ def _score(rays: _Rays, view: _View, focus: Focus) -> float:
 def _windowed(plane: Plane, rays: RayStream) -> Plane:
     """The rectangle about what is bright, and frames until almost all rays are in."""
     whole = plane.sized_for(rays)
-    place = hits_upwards(rays, plane.z, "Plane", plane.focus or FLAT)
+    place, _ = hits_upwards(rays, plane.z, "Plane", plane.focus or FLAT)
     low, high = np.asarray(np.quantile(place, MIDDLE, axis=0), dtype=np.float64)
     middle, sides = (low + high) / 2.0, ROOM * (high - low)
     everything = np.array([whole.closed("width"), whole.closed("height")])

@@ -9,7 +9,7 @@ import numpy as np
 
 from etendue.errors import ArgumentError
 from etendue.lightfield.carrier.part import Part, triple
-from etendue.lightfield.carrier.sizing import SLACK, places_and_directions, span
+from etendue.lightfield.carrier.sizing import SLACK, extent, sizing_rays
 from etendue.lightfield.carrier.surface import Surface
 from etendue.quantities.ray_stream import RayStream
 
@@ -60,12 +60,13 @@ class Box(Surface):
         return tuple(faces)
 
     def sized_for(self, rays: RayStream) -> Box:
-        """The smallest box about the rays' start points, but for strays far off."""
+        """The smallest box about the rays' start points, but for strays far off; of a stated size, about most light."""
         if not self.open_dimensions:
             return self
-        position, _ = places_and_directions(rays)
-        spans = [span(v, c) for v, c in zip(position.T, self.centre or (None, None, None), strict=True)]
-        extent = max(high - low for low, high in spans)
-        width, height, depth = (max(high - low, SLACK * extent) * (1 + SLACK) for low, high in spans)
+        some = sizing_rays(rays)
+        flux, sizes, centres = some.flux, (self.width, self.height, self.depth), self.centre or (None, None, None)
+        spans = [extent(v, flux, c, size) for v, c, size in zip(some.position.T, centres, sizes, strict=True)]
+        longest = max(high - low for low, high in spans)
+        width, height, depth = (max(high - low, SLACK * longest) * (1 + SLACK) for low, high in spans)
         middle = triple(np.array([(low + high) / 2 for low, high in spans]))
         return Box(self.width or width, self.height or height, self.depth or depth, self.centre or middle)

@@ -9,7 +9,7 @@ import numpy as np
 
 from etendue.errors import ArgumentError
 from etendue.lightfield.carrier.part import Part, Triple, triple
-from etendue.lightfield.carrier.sizing import SLACK, places_and_directions, radius_for, span
+from etendue.lightfield.carrier.sizing import SLACK, radius_for, sizing_rays, span
 from etendue.lightfield.carrier.surface import Surface
 from etendue.quantities.arguments import require_known
 from etendue.quantities.ray_stream import RayStream
@@ -87,7 +87,7 @@ class Cylinder(Surface):
         """The smallest cylinder about the rays' start points, but for strays far off."""
         if not self.open_dimensions:
             return self
-        position, _ = places_and_directions(rays)
+        position = sizing_rays(rays).position
         along = AXES.index(self.axis)
         low, high = span(position[:, along], None)
         bottom = low if self.bottom is None else self.bottom

@@ -50,5 +50,5 @@ class Disk(Surface):
         """The smallest disk that the rays' lines cross, but for strays far off."""
         if not self.open_dimensions:
             return self
-        hits = hits_upwards(rays, self.z, "Disk")
+        hits, _ = hits_upwards(rays, self.z, "Disk")
         return dataclasses.replace(self, radius=radius_for(np.hypot(*(hits - self.centre).T)))

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from etendue.errors import ArgumentError
 from etendue.lightfield.carrier.part import FLAT, WORLD, Focus, Part
-from etendue.lightfield.carrier.sizing import SLACK, hits_upwards, span
+from etendue.lightfield.carrier.sizing import SLACK, extent, hits_upwards
 from etendue.lightfield.carrier.sphere import Sphere
 from etendue.lightfield.carrier.surface import Surface
 from etendue.quantities.arguments import require_number
@@ -31,7 +31,7 @@ class Plane(Surface):
     width, height : float, optional
         Along X and Y [mm]; None: as large as the rays need.
     centre : tuple of float, optional
-        (x, y) of the middle [mm]; None: from the rays.
+        (x, y) of the middle [mm]; None: from the rays, for a stated size where it holds the most light.
     focus : tuple of 4 floats, optional
         Height above the plane at which light is sharp that leaves under θ, by powers of 1 - cos θ from the constant on [mm];
         None: 0 for all, but `LightField.fit` finds it.
@@ -93,11 +93,12 @@ class Plane(Surface):
         return (window, *frames, *beyond)
 
     def sized_for(self, rays: RayStream) -> Plane:
-        """The smallest rectangle that the rays' lines cross, but for strays far off."""
+        """The smallest rectangle that the rays' lines cross, but for strays far off; of a stated size, where most do."""
         if not self.open_dimensions:
             return self
-        hits = hits_upwards(rays, self.z, "Plane", self.focus or FLAT)
-        spans = [span(v, c) for v, c in zip(hits.T, self.centre or (None, None), strict=True)]
+        hits, flux = hits_upwards(rays, self.z, "Plane", self.focus or FLAT)
+        sizes, centres = (self.width, self.height), self.centre or (None, None)
+        spans = [extent(v, flux, c, size) for v, c, size in zip(hits.T, centres, sizes, strict=True)]
         centre = tuple((low + high) / 2 for low, high in spans)
         width, height = ((high - low) * (1 + SLACK) for low, high in spans)
         return dataclasses.replace(

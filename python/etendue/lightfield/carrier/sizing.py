@@ -8,6 +8,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError
 from etendue.lightfield.carrier.part import FLAT, Focus, Triple
 from etendue.lightfield.pilot_sample import pilot_sample
+from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
 
 FloatArray = npt.NDArray[np.float64]
@@ -22,8 +23,8 @@ SLACK = 1e-6
 """A surface sized from the rays is larger than they need by this factor, so that rounding loses none."""
 
 
-def places_and_directions(rays: RayStream) -> tuple[FloatArray, FloatArray]:
-    """Positions [mm] and directions of some of the rays, shape (m, 3) each.
+def sizing_rays(rays: RayStream) -> RaySet:
+    """Some of the rays, all of which carry flux.
 
     Raises
     ------
@@ -33,16 +34,14 @@ def places_and_directions(rays: RayStream) -> tuple[FloatArray, FloatArray]:
     Examples
     --------
     >>> import etendue as et
-    >>> position, direction = places_and_directions(et.RingSource(rays=1000))
-    >>> position.shape, direction.shape
-    ((1000, 3), (1000, 3))
+    >>> len(sizing_rays(et.RingSource(rays=1000)))
+    1000
     """
-    some = pilot_sample(rays, PILOT_RAYS)
-    return some.position, some.direction
+    return pilot_sample(rays, PILOT_RAYS)
 
 
-def hits_upwards(rays: RayStream, z: float, name: str, focus: Focus = FLAT) -> FloatArray:
-    """Places on a height, taken at its focus, of rays that head towards +Z [mm], shape (m, 2).
+def hits_upwards(rays: RayStream, z: float, name: str, focus: Focus = FLAT) -> tuple[FloatArray, FloatArray]:
+    """Places on a height, taken at its focus, of rays that head towards +Z [mm], shape (m, 2), and their flux, (m,).
 
     Raises
     ------
@@ -53,17 +52,17 @@ def hits_upwards(rays: RayStream, z: float, name: str, focus: Focus = FLAT) -> F
     --------
     >>> import etendue as et
     >>> rays = et.RaySet([[0, 0, 0], [0, 0, 0]], [[0.6, 0, 0.8], [0, 0, -1]], [1, 1])
-    >>> hits_upwards(rays, 4.0, "Plane").tolist()
+    >>> hits_upwards(rays, 4.0, "Plane")[0].tolist()
     [[3.0, 0.0]]
     """
-    position, direction = places_and_directions(rays)
-    up = np.flatnonzero(direction[:, 2] > 0)
+    some = sizing_rays(rays)
+    up = np.flatnonzero(some.direction[:, 2] > 0)
     if not len(up):
         raise ArgumentError(f"{name}: no ray heads towards +Z; turn the rays, or choose a sphere or cylinder.")
-    x, k = position[up], direction[up]
+    x, k = some.position[up], some.direction[up]
     sharp = z + np.polynomial.polynomial.polyval(1.0 - k[:, 2], focus)
     hits: FloatArray = x[:, :2] + ((sharp - x[:, 2]) / k[:, 2])[:, None] * k[:, :2]
-    return hits
+    return hits, np.asarray(some.flux, float)[up]
 
 
 def span(values: FloatArray, centre: float | None) -> tuple[float, float]:
@@ -86,6 +85,41 @@ def span(values: FloatArray, centre: float | None) -> tuple[float, float]:
     if high == low:  # all rays through one point: any extent will do
         low, high = low - 0.5e-3, high + 0.5e-3
     return low, high
+
+
+def extent(values: FloatArray, flux: FloatArray, centre: float | None, size: float | None) -> tuple[float, float]:
+    """Where along a line a surface lies that is for light at the values, shape (m,), with their flux, (m,).
+
+    Of a stated `size` without a centre: where it holds the most light. Else the `span`.
+
+    Examples
+    --------
+    >>> light = np.array([0.0, 1.0, 1.5, 9.0])
+    >>> extent(light, np.ones(4), None, 2.0), extent(light, np.ones(4), None, None)
+    ((-0.25, 1.75), (0.0, 9.0))
+    """
+    if centre is None and size is not None:
+        middle = fullest(values, flux, size)
+        return middle - size / 2, middle + size / 2
+    return span(values, centre)
+
+
+def fullest(values: FloatArray, flux: FloatArray, size: float) -> float:
+    """The middle of the interval of length `size` that holds the most flux, of light at the values, shape (m,) each.
+
+    The middle of what it holds, so that it lies evenly about a source that is smaller than it.
+
+    Examples
+    --------
+    >>> fullest(np.array([0.0, 1.0, 1.5, 9.0]), np.ones(4), 2.0)
+    0.75
+    """
+    order = np.argsort(values, kind="stable")
+    place = values[order]
+    upto = np.concatenate([[0.0], np.cumsum(flux[order])])
+    end = np.searchsorted(place, place + size, side="right")
+    first = int(np.argmax(upto[end] - upto[:-1]))
+    return float(place[first] + place[end[first] - 1]) / 2
 
 
 def radius_for(distances: FloatArray) -> float:
@@ -117,6 +151,6 @@ def sphere_radius(rays: RayStream, centre: Triple) -> float:
     >>> round(sphere_radius(rays, (0, 0, 0)), 4)
     3.0
     """
-    position, direction = places_and_directions(rays)
-    offset = position - np.asarray(centre)
-    return radius_for(np.linalg.norm(np.cross(offset, direction), axis=1))
+    some = sizing_rays(rays)
+    offset = some.position - np.asarray(centre)
+    return radius_for(np.linalg.norm(np.cross(offset, some.direction), axis=1))
