@@ -305,6 +305,15 @@ def test_a_klems_file_that_lacks_values_is_refused_with_its_line(samples: Path) 
         read_bsdf_data(samples / "bsdf" / "2011-SA1-small.xml")
 
 
+@pytest.mark.parametrize("count", ["nan", "1e999", "2.5", "0"])
+def test_a_basis_of_klems_has_whole_numbers_of_patches(tmp_path: Path, samples: Path, count: str) -> None:
+    text = (samples / "bsdf" / "2011-SA1-small.xml").read_text()
+    assert "<nPhis>8</nPhis>" in text
+    (tmp_path / "x.xml").write_text(text.replace("<nPhis>8</nPhis>", f"<nPhis>{count}</nPhis>", 1))
+    with pytest.raises(FormatError, match=r"x\.xml: line \d+, AngleBasisBlock: a band from 5 to 15° in "):
+        read_bsdf_data(tmp_path / "x.xml")
+
+
 def test_what_cannot_be_written(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match="klems"):
         et.write_bsdf(tmp_path / "x.xml", et.bsdf.Gaussian(peak=1, sigma=0.1), format="klem")

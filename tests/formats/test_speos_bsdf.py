@@ -129,3 +129,13 @@ def test_a_byte_order_mark_changes_nothing(tmp_path: Path) -> None:
         path.write_text(hand(), encoding=encoding)
         found.append([one.values.tolist() for one in read_bsdf_data(path).slices])
     assert found[0] == found[1]
+
+
+def test_numbers_that_make_no_table_are_refused_with_the_file(tmp_path: Path) -> None:
+    """An intensity of 1e308 at 80°, over cos 80°, is beyond the range of numbers."""
+    path = tmp_path / "hand.anisotropicbsdf"
+    whole = hand(type_of_values=0)
+    path.write_text(re.sub(r"(?m)^80 \S+", "80 1e308", whole, count=1))
+    assert path.read_text() != whole
+    with pytest.raises(FormatError, match=r"hand\.anisotropicbsdf: values: values of a BSDF are finite"):
+        read_bsdf_data(path)

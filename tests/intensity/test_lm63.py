@@ -206,6 +206,8 @@ def test_tilt_is_kept_and_not_applied(read, tmp_path: Path) -> None:
     assert "0.9; it was not applied" in str(beside.complaints[0])
     missing = read(ies(tilt="TILT=../other.tlt"))
     assert "is not there" in str(missing.complaints[0])
+    # No system knows a name of 400 letters: it is an error to ask for it, and the table does not rest on it.
+    assert "is not there" in str(read(ies(tilt=f"TILT={'9' * 400}")).complaints[0])
     with pytest.raises(FormatError, match="tilt angles: the file ends"):
         read(ies(tilt="TILT=INCLUDE\n1\n300\n0 45 90\n1.0 .95 .9"))
     assert any("tilt" in note for note in write_intensity(tmp_path / "b.ies", include))

@@ -125,6 +125,13 @@ def test_a_turned_table_is_not_said_to_be_unturned(run: Run) -> None:
     assert "nothing was turned" not in run("a.ies", "--rotate", 45)[1]
 
 
+@pytest.mark.parametrize(("keyword", "told"), [("", "50.5 lm"), ("[_INTENSITYUNITS] mW/sr\n", "0.0505 W")])
+def test_a_stated_flux_has_its_unit(run: Run, keyword: str, told: str) -> None:
+    head = f"IESNA:LM-63-2002\n[TEST] x\n[MANUFAC] y\n{keyword}[_TOTALLUMINAIRELUMENS] 50.5\nTILT=NONE\n"
+    Path("a.ies").write_text(f"{head}1 -1 1 2 1 1 2 0 0 0\n1 1 9\n0 90\n0\n8 8\n")
+    assert f"  stated flux: {told}\n" in run("a.ies")[1]
+
+
 @pytest.mark.usefixtures("led")
 @pytest.mark.parametrize(
     ("arguments", "status", "hint"),

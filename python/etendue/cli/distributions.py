@@ -69,7 +69,7 @@ def print_intensity(distribution: Intensity) -> None:
             )
         elif name not in {"keywords", "lamp_sets", "tilt"}:
             text = f"{value:.7g}" if isinstance(value, float) else str(value)
-            unit = re.search(r"\[(\w+)\]", LUMINAIRE_FACTS[name])
+            unit = re.search(r"\[(\w+)\]", LUMINAIRE_FACTS[name].replace("[flux unit]", f"[{distribution.flux_unit}]"))
             told = f"{text[:100]}{f' {unit[1]}' if unit else ''}" if _stated(name, value) else "not stated"
             say(f"  {name.replace('_', ' ')}: {told}")
     for note in distribution.notes:

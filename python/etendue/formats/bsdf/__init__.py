@@ -28,6 +28,7 @@ from etendue.formats.bsdf import (
     zemax,
 )
 from etendue.formats.bsdf.bsdf_format import NO_ERRORS, SNIFFED_BYTES, BsdfFormat, ShareTables
+from etendue.formats.bsdf.tokens import ADVICE
 from etendue.formats.encodings import in_utf8, refuse_unmarked
 from etendue.formats.input import as_path, require_readable
 from etendue.formats.other_kind import other_kind
@@ -110,7 +111,12 @@ def read_bsdf_data(path: str | os.PathLike[str]) -> BsdfData:
             head = stream.read(SNIFFED_BYTES)
         for candidate in BSDF_FORMATS.values():
             if candidate.recognise(head):
-                return dataclasses.replace(candidate.read(readable), format=candidate.name)
+                try:
+                    data = candidate.read(readable)
+                except ArgumentError as error:
+                    # Numbers that are each fine and make no slice together.
+                    raise FormatError(path, "values", str(error), ADVICE) from error
+                return dataclasses.replace(data, format=candidate.name)
     if path.suffix.lower() in REFUSED:
         what, advice = REFUSED[path.suffix.lower()]
         raise UnsupportedFormatError(path, "extension", f"this is {what}", advice)

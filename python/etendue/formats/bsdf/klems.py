@@ -111,7 +111,7 @@ def _basis(element: Element, path: Path) -> tuple[str, Basis]:
             low, high, count = (number(word) for word in (*words, block.words("nPhis")))
         except ValueError:
             raise FormatError(path, block.place, "a band without bounds and nPhis", DAMAGED) from None
-        if not (0.0 <= low < high <= 90.0 and count == int(count) and 1 <= count <= 4096):
+        if not (0.0 <= low < high <= 90.0 and count.is_integer() and 1 <= count <= 4096):
             raise FormatError(path, block.place, f"a band from {low:g} to {high:g}° in {count:g} parts", DAMAGED)
         bands.append((low, high, int(count)))
     edges = [(a[1], b[0]) for a, b in itertools.pairwise(bands)]

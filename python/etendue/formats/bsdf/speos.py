@@ -156,7 +156,7 @@ def slice_of(tokens: Tokens, theta: float, turn: float, transmitted: bool, *, in
         phi, values = phi[:-1], values[:, :-1]
     if intensity:
         cosine = np.cos(np.radians(polar))[:, None]
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             values = np.where(cosine > 1e-6, values / cosine, np.nan)
     grid = PolarGrid("normal", polar, phi + turn)
     return BsdfSlice(light_from(theta, (180.0 + turn) % 360.0), values.T, transmitted, grid=grid)

@@ -189,7 +189,7 @@ class _Reader:
         if kind != "INCLUDE":
             # Only beside the file itself: a name with folders in it could point anywhere.
             beside = self.path.parent / Path(self.tilt.replace("\\", "/")).name
-            if not self.tilt or not beside.is_file() or beside == self.path:
+            if not self.tilt or not _is_file(beside) or beside == self.path:
                 self.complain("warning", "TILT=", f"the file {self.tilt[:60]!r} is not there; its factors are unknown")
                 return {}
             words = _Words.of(beside, read_lines(beside), 0)
@@ -358,6 +358,14 @@ class _Reader:
         if stated is not None and abs(intensity.flux - stated) > 0.05 * abs(stated):
             found = f"it says {stated:.6g} {intensity.flux_unit}, the table integrates to {intensity.flux:.6g}"
             self.complain("warning", "[_TOTALLUMINAIRELUMENS]", found)
+
+
+def _is_file(path: Path) -> bool:
+    """Whether there is a file; there is none under a name that the system does not know how to have."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
 
 
 FORMAT = IntensityFormat("lm63", "IES LM-63", ".ies", recognise, read, write)
