@@ -6,6 +6,7 @@ import base64
 import importlib.util
 import itertools
 import json
+import logging
 import struct
 import sys
 from collections.abc import Callable
@@ -241,6 +242,8 @@ def test_polygons_of_obj_files_may_have_reentrant_corners(tmp_path: Path) -> Non
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n", "line 4: 'f 1 2' is no face"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 0\n", "line 4: 'f 1 2 0' is no face"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 -4\n", "line 5: a face names a vertex that is not there"),
+        (f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 {1 << 63}\n", "line 4: a face names a vertex that is not there"),
+        (f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -{1 << 70}\n", "line 4: a face names a vertex that is not there"),
         ("v 0 0 0\nv 4 3 0\nv 4 0 0\nv 0 2 0\nf 1 2 3 4\n", "line 5: a polygon crosses itself"),
     ],
 )
@@ -257,6 +260,16 @@ def test_text_stl_that_is_cut_off_is_refused(tmp_path: Path) -> None:
         read_mesh(tmp_path / "cut", None)
     (tmp_path / "loud").write_bytes(two.upper())
     assert len(read_mesh(tmp_path / "loud", None).triangles) == 16
+
+
+def test_normals_of_stl_files_that_are_no_numbers_are_passed_over_in_silence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Triangles without area have such normals from some programs; the library logs a traceback over them."""
+    monkeypatch.setattr(logging.getLogger(), "handlers", [])
+    (tmp_path / "odd").write_bytes(stl_ascii(2.0).replace(b"normal 0 0 0", b"normal -1.#IND 0 0", 1))
+    assert len(read_mesh(tmp_path / "odd", None).triangles) == 8
+    assert capsys.readouterr().err == ""
 
 
 def test_open_and_twisted_meshes_are_doubted() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import logging
 import os
 import re
 from collections.abc import Callable
@@ -232,6 +233,9 @@ def _step_body(path: Path, bodies: list[StepBody]) -> StoredMesh:
 def _load(path: Path, form: MeshFormat, raw: bytes) -> tuple[Array, Triangles]:
     import trimesh  # noqa: PLC0415 - takes a second to import and is needed by few scenes
 
+    # It logs a traceback over normals of STL files that are no numbers, which are not needed; without a handler Python prints it.
+    if not (log := logging.getLogger("trimesh")).handlers:
+        log.addHandler(logging.NullHandler())
     # Pictures and the files of materials would be read for nothing; STL has none.
     options: dict[str, Any] = {} if form.name.startswith("stl") else {"skip_materials": True}
     try:

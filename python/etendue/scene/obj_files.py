@@ -20,6 +20,9 @@ MOST_CORNERS = 10_000
 THIN = 1e-5
 """Width over length of a polygon that may have none, in the six or seven digits that files have."""
 
+MOST_VERTICES = 1 << 62
+"""Larger numbers of vertices fit no array."""
+
 _CONTINUED = re.compile(r"\\\s*$")
 
 
@@ -96,6 +99,8 @@ def _corners(path: Path, number: int, words: list[str], known: int) -> list[int]
         named = []
     if len(named) < 3 or 0 in named:
         raise FormatError(path, f"line {number}", f"{' '.join(words)[:60]!r} is no face", "The file is damaged.")
+    if max(map(abs, named)) > MOST_VERTICES:
+        raise FormatError(path, f"line {number}", "a face names a vertex that is not there", "The file is damaged.")
     return [i - 1 if i > 0 else known + i for i in named]
 
 
