@@ -233,7 +233,7 @@ def _step_body(path: Path, bodies: list[StepBody]) -> StoredMesh:
 def _load(path: Path, form: MeshFormat, raw: bytes) -> tuple[Array, Triangles]:
     import trimesh  # noqa: PLC0415 - takes a second to import and is needed by few scenes
 
-    # It logs a traceback over normals of STL files that are no numbers, which are not needed; without a handler Python prints it.
+    # It logs a traceback over normals of STL files that are no numbers; without a handler Python would print it.
     if not (log := logging.getLogger("trimesh")).handlers:
         log.addHandler(logging.NullHandler())
     # Pictures and the files of materials would be read for nothing; STL has none.
