@@ -52,6 +52,33 @@ def test_the_chosen_acceptance_is_nearly_the_best(n: int, exponent: float, pixel
     assert error[choice.index] < 1.25 * error.min(), (LADDER[choice.index], LADDER[int(error.argmin())])
 
 
+def unequal_rays(n: int, seed: int) -> et.RaySet:
+    """A Lambertian square of 4 mm and 100 lm in expectation; two of a hundred rays have a hundred times the others' flux."""
+    rng = np.random.default_rng(seed)
+    cos, phi = np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
+    sin = np.sqrt(1 - cos**2)
+    place = np.stack([4 * rng.random(n) - 2, 4 * rng.random(n) - 2, np.zeros(n)], axis=1)
+    flux = np.where(rng.random(n) < 0.02, 100.0, 1.0) * 100.0 / (n * (0.02 * 100 + 0.98))
+    return et.RaySet(place, np.stack([sin * np.cos(phi), sin * np.sin(phi), cos], axis=1), flux)
+
+
+def test_a_cone_that_by_chance_sees_no_heavy_ray_is_not_chosen_for_its_small_noise() -> None:
+    """Intensity towards the observer: of a cone of half-angle α, Φ/π · (1 + cos α)/2 (theory eq. 9) in the mean of sets.
+
+    Narrow cones see few rays, mostly light ones: their squares make little of their noise, and less of the light.
+    """
+    observer, screen = et.Observer(0, 0, 20000), et.Screen(5, 5, 16, 16)
+    area = screen.width * screen.height / (screen.columns * screen.rows) * 1e-6
+    missing = []
+    for seed in range(60):
+        estimate = cone_estimates(unequal_rays(20_000, seed), [ConeView(observer, screen, LADDER)])[0][0]
+        choice = choose_acceptance(estimate, screen)
+        expected = 100 / np.pi * (1 + np.cos(np.radians(choice.acceptance))) / 2
+        missing.append(estimate.luminance[choice.index].sum() * area / expected - 1)
+    z = np.mean(missing) / (np.std(missing, ddof=1) / np.sqrt(len(missing)))
+    assert abs(z) < 3.3, (z, np.mean(missing))  # two-sided, 0.1 %
+
+
 @pytest.mark.slow
 def test_the_cases_above_have_different_answers() -> None:
     """Otherwise a constant would pass: a sharp lobe with many rays wants a narrow cone, a wide lobe a wide one."""
