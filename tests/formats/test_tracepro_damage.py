@@ -58,3 +58,13 @@ def test_absurd_numbers(tmp_path: Path, kind: str) -> None:
             path.write_text("\n".join([*lines[:k], " ".join(changed), *lines[k + 1 :], ""]))
             with contextlib.suppress(EtendueError):
                 read_bsdf_data(path)
+
+
+def test_tables_of_another_temperature_than_the_shares_are_refused(tmp_path: Path) -> None:
+    """Rows of shares at 300 K and 310 K, of which the table holds 310 K alone: those of the first temperature are read."""
+    kind = next(kind for kind, text in FILES.items() if b"[Table" in text)
+    head, mark, table = FILES[kind].decode().partition("[Table")
+    path = tmp_path / "warm.txt"
+    path.write_text(head + mark + table.replace("\n300", "\n310"))
+    with pytest.raises(FormatError, match=r"warm\.txt: line \d+: no table for "):
+        read_bsdf_data(path)

@@ -37,6 +37,7 @@ def blocks_of(lines: Lines, shares: Rows, begin: int, end: int) -> dict[Key, Row
     keys, which = np.unique(rows.values[:, 1:4], axis=0, return_inverse=True)
     # The places of the rows of each, in their order: a look at all rows for each would take the square of the time.
     places = np.split(np.argsort(which.ravel(), kind="stable"), np.cumsum(np.bincount(which.ravel()))[:-1])
+    places = places[: len(keys)]  # of nothing the split is one empty part
     blocks = {_key(key): rows.where(own) for key, own in zip(keys, places, strict=True)}
     for wavelength, theta, phi in sorted({_key(key) for key in shares.values[:, 1:4]} - set(blocks)):
         place = f"{theta:g}° of incidence, azimuth {phi:g}°, {wavelength:g} µm"
