@@ -61,7 +61,7 @@ def test_absurd_numbers(tmp_path: Path, kind: str) -> None:
 
 
 def test_tables_of_another_temperature_than_the_shares_are_refused(tmp_path: Path) -> None:
-    """Rows of shares at 300 K and 310 K, of which the table holds 310 K alone: those of the first temperature are read."""
+    """Shares at 300 K, and a table at 310 K alone."""
     kind = next(kind for kind, text in FILES.items() if b"[Table" in text)
     head, mark, table = FILES[kind].decode().partition("[Table")
     path = tmp_path / "warm.txt"
