@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from etendue import _core
+from etendue.luminance import scene_map
+from etendue.scene import compile_scene
 from etendue.tracing.result import TraceResult
 from etendue.tracing.work import BATCHES
 from oracles.results import bits
@@ -229,16 +232,22 @@ def test_collected_rays_tell_that_they_are_copies(tmp_path: Path) -> None:
     assert not any("copies" in c.found for c in own.complaints)
 
 
-def test_a_trace_of_collected_rays_tells_that_they_are_copies() -> None:
+def test_scenes_of_collected_rays_tell_that_they_are_copies(monkeypatch: pytest.MonkeyPatch) -> None:
     """100 copies of each of 50 rays: errors made as if all were independent are up to √100 times too small."""
+    sphere = et.Sphere(radius=10.0, centre=(1.0, 2.0, 0.0))  # for which nothing is searched
+    fit = functools.partial(et.LightField.fit, surface=sphere, depths=(2, 2, 2, 2))
+    monkeypatch.setattr(scene_map, "fit_or_recall", lambda rays, **_: fit(rays))
     ball = {"kind": "rays", "name": "ball", "shape": {"kind": "sphere", "radius": 1e3}}
     source = {"kind": "rays", "name": "led", "rays": lopsided(50, 1)}
     copies = et.trace(et.Scene(sources=[source], detectors=[ball]), 5000, 3).rays["ball"]
     for rays, times in ((copies, 1), (lopsided(50, 1), 0)):
-        notes = et.trace(et.Scene(sources=[{**source, "rays": rays}]), None).notes
-        told = [note for note in notes if "copies of one ray of a set" in note]
-        assert len(told) == times
-        assert all(note.startswith("led: up to 100 ") and "up to 10 times" in note for note in told)
+        scene = et.Scene(sources=[{**source, "rays": rays}])
+        seen, fits = scene_map.with_fields(scene)
+        for notes in (et.trace(scene, None).notes, compile_scene(seen).notes):
+            told = [note for note in notes if "copies of one ray of a set" in note]
+            assert len(told) == times
+            assert all(note.startswith("led: up to 100 ") and "up to 10 times" in note for note in told)
+        assert not any("copies of one ray" in note for note in fits)
 
 
 # --- coverage ----------------------------------------------------------------------------------------------------------

@@ -388,9 +388,8 @@ def with_fields(
         seen, field, share = _fitted(source, scene, threads, {} if fits is None else fits, cache=cache)
         sources.append(seen)
         lost = f"; {share:.2%} of the flux does not come from it" if share > 1e-4 else ""
+        # What the field says of itself, and of its rays, is in the notes of the scene with it.
         notes.append(f"{name}: a light field on {field.surface.told} was fitted to its rays{lost}")
-        # What the field says of itself is in the notes of the scene with it.
-        notes += [f"{name}: {note}" for note in (() if source.rays is None else source.rays.notes)]
     return scene.replace(sources=tuple(sources)), notes
 
 
