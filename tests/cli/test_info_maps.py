@@ -59,10 +59,13 @@ def test_an_illuminance_map_is_told(run: Run) -> None:
     done = run("info", "desk.npz")
     assert done.status == 0, done.err
     assert "desk.npz: map of illuminance" in done.out
-    assert "mean 250 lx, least/mean 0.400, flux 0.05 lm" in done.out
+    assert "mean 250 lx, least/mean 0.4, flux 0.05 lm" in done.out
     (facts,) = run("info", "--json", "desk.npz").json
     assert (facts["mean"], facts["uniformity"], facts["flux"]) == pytest.approx((250.0, 0.4, 250 * 200e-6))
     assert facts["centre"] == [1, 2, 3]
+    # Of no light 0 over 0 is no number, which people read as that.
+    desk.replace(values=0.0 * values).save("dark.npz")
+    assert "mean 0 lx, least/mean undefined, flux 0 lm" in run("info", "dark.npz").out
 
 
 def test_a_damaged_map_and_an_archive_of_rays_are_what_they_are(run: Run) -> None:

@@ -22,7 +22,7 @@ from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.measured import measured
 from etendue.quantities.observer import Screen
-from etendue.quantities.powers_of_ten import counted
+from etendue.quantities.powers_of_ten import counted, rounded
 from etendue.quantities.unlifted import Unlifted, unlifted
 
 LIFT = 0.01
@@ -144,7 +144,7 @@ def _print_regions(lmap: AnyMap, regions: Sequence[AnyRegion]) -> None:
             f"  region {number}: mean {measured(found.mean, mean_error, found.unit)}, "
             f"minimum {counted(found.minimum, found.unit)}, maximum {counted(found.maximum, found.unit)}"
             f"{_lifted(found, together)}, "
-            f"minimum over mean {found.uniformity:.3g}"
+            f"minimum over mean {rounded(found.uniformity, 3)}"
             + "".join(f"; {note}" for note in found.notes)
             + (f"; {found.dead_pixels} of {found.pixels} pixels are dead and count as 0" if found.dead_pixels else "")
         )
@@ -155,7 +155,7 @@ def print_illuminance(found: IlluminanceMap, regions: Sequence[AnyRegion] = ()) 
     x, y, z = found.centre
     say(f"{found.quantity} around ({x:g}, {y:g}, {z:g}) mm")
     say(
-        f"  mean {counted(found.mean, found.unit)}, least/mean {found.uniformity:.3f}, "
+        f"  mean {counted(found.mean, found.unit)}, least/mean {rounded(found.uniformity, 3)}, "
         f"flux {counted(found.flux, found.flux_unit)}"
     )
     if found.relative_error is not None:

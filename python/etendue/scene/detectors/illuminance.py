@@ -74,7 +74,7 @@ class GridIlluminance(Detection[IlluminanceMap]):
 
     def summary(self, quantity: IlluminanceMap) -> str:
         """Mean and uniformity."""
-        return f"mean {counted(quantity.mean, quantity.unit)}, least/mean {quantity.uniformity:.3f}"
+        return f"mean {counted(quantity.mean, quantity.unit)}, least/mean {rounded(quantity.uniformity, 3)}"
 
 
 def lowered_by_chance(values: Array, errors: Array) -> float:
