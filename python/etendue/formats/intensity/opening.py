@@ -45,6 +45,8 @@ _SIGNS_BY_SHAPE: dict[str, tuple[int, int, int]] = {
     "ellipsoid": (-1, -1, -1),
     "cylinder along length": (-1, 1, -1),
     "cylinder along width": (1, -1, -1),
+    # One of both extents is 0, and has no sign.
+    "vertical ellipse": (-1, -1, -1),
 }
 """How LM-63-2002 spells each shape."""
 
@@ -89,7 +91,7 @@ def opening_lengths(facts: Mapping[str, Any]) -> tuple[tuple[float, float, float
     signs = _SIGNS_BY_SHAPE.get(shape)
     if signs is None:
         return (0.0, 0.0, 0.0), False
-    width, length, height = (sign * extent if sign else 0.0 for sign, extent in zip(signs, (y, x, z), strict=True))
+    width, length, height = (sign * extent if sign and extent else 0.0 for sign, extent in zip(signs, (y, x, z), strict=True))
     return (width, length, height), True
 
 
