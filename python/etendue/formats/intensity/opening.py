@@ -91,7 +91,9 @@ def opening_lengths(facts: Mapping[str, Any]) -> tuple[tuple[float, float, float
     signs = _SIGNS_BY_SHAPE.get(shape)
     if signs is None:
         return (0.0, 0.0, 0.0), False
-    width, length, height = (sign * extent if sign and extent else 0.0 for sign, extent in zip(signs, (y, x, z), strict=True))
+    width, length, height = (
+        sign * extent if sign and extent else 0.0 for sign, extent in zip(signs, (y, x, z), strict=True)
+    )
     return (width, length, height), True
 
 
