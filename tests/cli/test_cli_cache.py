@@ -26,3 +26,19 @@ def test_fields_are_kept_shown_and_cleared(run: Run, tmp_path: Path, monkeypatch
     assert run("cache", "--json").json["fields"] == 0
     monkeypatch.setenv(FOLDER_VARIABLE, "")
     assert "no light fields are kept" in run("cache").out
+
+
+@pytest.mark.slow
+def test_a_report_has_the_field_that_maps_have(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "kept"))
+    et.write_rays(tmp_path / "led.tm25ray", et.RingSource(rays=3000))
+    surface = ("--surface", "disk:radius=40")  # to choose one takes seconds
+    look = ("luminance", "led.tm25ray", "--observer", "0,0", "--size", "70,70", "--pixels", "4,4", *surface)
+    assert run(*look, "-o", "map.npz").status == 0
+    fits = []
+    fit = et.LightField.fit
+    monkeypatch.setattr(et.LightField, "fit", staticmethod(lambda *a, **k: fits.append(1) or fit(*a, **k)))
+    report = ("report", "led.tm25ray", "--no-forecast", "-o", "page.html", *surface)
+    for more, times in (((), 0), (("--no-cache",), 1), (("--seed", "2"), 2), (("--seed", "2"), 2)):
+        assert run(*report, *more).status == 0
+        assert len(fits) == times

@@ -50,6 +50,9 @@ def report(
     seed: Annotated[
         int, typer.Option("--seed", help="Seed: decides which rays are held out of the fit to judge it.", min=0)
     ] = 1,
+    cache: Annotated[
+        bool, typer.Option("--cache/--no-cache", help="Take a light field that was fitted before (etendue cache).")
+    ] = True,
     threads: Threads = None,
     flux: Flux = None,
     unit: Unit = None,
@@ -73,6 +76,7 @@ def report(
             title=title,
             forecast=forecast,
             seed=seed,
+            cache=cache,
             threads=threads,
             progress=progress,
         )

@@ -74,6 +74,7 @@ def fit_or_recall(
     rays: RayStream,
     surface: Surface | Literal["auto"] = "auto",
     *,
+    seed: int = 1,
     cache: bool = True,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -82,7 +83,7 @@ def fit_or_recall(
 
     Parameters
     ----------
-    rays, surface, threads, progress
+    rays, surface, seed, threads, progress
         As of `LightField.fit`.
     cache : bool
         Whether the cache is looked into, and the field kept there.
@@ -100,11 +101,11 @@ def fit_or_recall(
     600
     """
     if not cache or _folder() is None:
-        return as_stored(LightField.fit(rays, surface, threads=threads, progress=progress))
-    name = _name(rays, surface, threads)
+        return as_stored(LightField.fit(rays, surface, seed=seed, threads=threads, progress=progress))
+    name = _name(rays, surface, seed, threads)
     field, told = _recall(name), notes_of_rays(rays)
     if field is None:
-        field = as_stored(LightField.fit(rays, surface, threads=threads, progress=progress))
+        field = as_stored(LightField.fit(rays, surface, seed=seed, threads=threads, progress=progress))
         field = field.replace(notes=field.notes[: len(field.notes) - len(told)])
         _keep_on_disk(name, field)
     with _lock:
@@ -206,14 +207,14 @@ def _keep_on_disk(name: str, field: LightField) -> None:
                 path.unlink(missing_ok=True)
 
 
-def _name(rays: RayStream, surface: Surface | Literal["auto"], threads: int | None) -> str:
+def _name(rays: RayStream, surface: Surface | Literal["auto"], seed: int, threads: int | None) -> str:
     """A digest of everything that a fit hangs on."""
     digest = hashlib.blake2b(digest_size=20)
     meaning: tuple[Any, ...] = (len(rays), rays.flux_unit, float(rays.total_flux))
     if isinstance(rays, RaySet):
         meaning += (rays.meaning.single_wavelength, [(s.wavelength.tolist(), s.weight.tolist()) for s in rays.spectra])
     options = surface if isinstance(surface, str) else repr(surface)
-    digest.update(repr((_program(), meaning, options)).encode())
+    digest.update(repr((_program(), meaning, options, seed)).encode())
     source = rays.core_source()
 
     def piece(start: int) -> bytes:

@@ -15,8 +15,8 @@ from etendue.formats.rays import read_rays
 from etendue.formats.rays.facts import fact_rows, ray_facts
 from etendue.lightfield.carrier import Surface
 from etendue.lightfield.diagnostics import Diagnostics, diagnose
+from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.lightfield.forecast import FEWEST_RAYS, REFITS
-from etendue.lightfield.light_field import LightField
 from etendue.luminance.estimate import luminance_map
 from etendue.luminance.framing import centre_of_light, framed, light_towards, probe
 from etendue.quantities.arguments import require
@@ -144,6 +144,7 @@ def report_source(
     title: str | None = None,
     forecast: bool = True,
     seed: int = 1,
+    cache: bool = True,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> SourceReport:
@@ -165,6 +166,8 @@ def report_source(
         note tells if there are too few, 4 000.
     seed : int
         Of the rays held out.
+    cache : bool
+        Whether a light field that was fitted to the same rays before is taken, and this one kept; see `cache_content`.
     threads : int, optional
         All cores if not given; the result does not depend on it.
     progress : callable, optional
@@ -200,7 +203,7 @@ def report_source(
     if observers is not None and not observers:
         raise ArgumentError("report_source: the sequence of observers is empty; give at least one.")
     facts = fact_rows(ray_facts(rays, name))
-    field = LightField.fit(rays, surface, seed=seed, threads=threads, progress=progress)
+    field = fit_or_recall(rays, surface, seed=seed, cache=cache, threads=threads, progress=progress)
 
     def refitted(done: int) -> None:
         if progress is not None:
