@@ -471,6 +471,24 @@ def test_diagnostics_are_plain_data_and_a_few_lines() -> None:
 
 
 @pytest.mark.slow
+def test_factors_of_hundreds_and_scores_of_one_ray_are_written_as_people_write_them() -> None:
+    """A slow law (exponent 0.3) leaves it open whether a hundred times the rays halve the error: not 1e+02 of them."""
+    field = field_of(PLANE, part(ramp(16).reshape(2, 2, 2, 2), 1e-3, 0.02))
+    law = law_of_gains(RUNGS, gains_of(0.02, 0.3), np.eye(2) * 1e-10, 10_000)
+    alone = dataclasses.replace(REPORT, score_error=math.inf)
+    found = dataclasses.replace(diagnose(field), forecast=law, report=alone)
+    lines, labels = found.summary(), [str(line.get_label()) for line in plot_characteristic(found).axes[2].lines]
+    label = next(text for text in labels if "half the error" in text)
+    high = law.factor(0.5).high
+    assert 100.0 <= high < 1000.0
+    assert f" to {high:.0f}) times the rays" in lines
+    assert f" to {round(high, -1):.0f})" in label
+    assert "held-out score -2.0000 nat per ray\n" in lines
+    for text in (lines, label):
+        assert not re.search(r"e\+|inf", text), text
+
+
+@pytest.mark.slow
 def test_where_fits_to_more_rays_gain_nothing_the_error_bars_are_a_bound() -> None:
     """Gains of -4 ± 2 and 1 ± 2 in 10⁵: no law, no factor, and nothing at 0 on a logarithmic axis."""
     law = law_of_gains(RUNGS, np.array([-4e-5, 1.2e-5]), np.eye(2) * 2.2e-5**2, 10_000)

@@ -98,7 +98,7 @@ def print_field(field: LightField) -> None:
         *(("grid" if number == 0 else "", text) for number, text in enumerate(_grids(field))),
         ("evidence", f"{report.log_evidence:,.1f} nat against the base measure"),
         ("degrees of freedom", f"{report.effective_cells:,.0f}, effective"),
-        ("held-out score", f"{report.score:.4f} ± {report.score_error:.4f} nat per ray"),
+        ("held-out score", report.score_text),
         ("", f"{ahead:+.4f} against the equal-étendue histogram"),
         ("resolves", field.resolution().summary()),
     ]

@@ -22,6 +22,7 @@ from etendue.lightfield.resolution import Resolution
 from etendue.lightfield.trees import Base
 from etendue.quantities.arguments import require, require_callable
 from etendue.quantities.measured import measured
+from etendue.quantities.powers_of_ten import rounded
 from etendue.quantities.ray_stream import RayStream, checked_seed, checked_threads
 from etendue.units import LUMINANCE_UNIT, MM2_PER_M2, FluxUnit
 
@@ -109,7 +110,7 @@ class Diagnostics:
         unit, report, curve = LUMINANCE_UNIT[self.flux_unit], self.report, self.curve
         half, most = curve.etendue_of(0.5), curve.etendue_of(0.99)
         lines = [
-            f"held-out score {report.score:.4f} ± {report.score_error:.4f} nat per ray",
+            f"held-out score {report.score_text}",
             f"{self.lead:+.4f} nat per ray against the equal-étendue histogram",
             f"{report.effective_cells:,.0f} effective degrees of freedom",
             f"relative error at a ray by the error bars {self.expected_error:.1%}",
@@ -300,13 +301,18 @@ def _forecast_lines(forecast: Forecast, expected_error: float) -> list[str]:
     error, factor, gain = forecast.error(), forecast.factor(0.5), forecast.gain(4.0)
     return [
         f"relative error at a ray by fits to parts of the rays {_between(error, '{:.1%}')}, and what the grid blurs",
-        f"half of it would take {_between(factor, '{:.3g}')} times the rays",
+        f"half of it would take {_factor(factor)} times the rays",
         f"four times the rays would raise the score by {_between(gain, '{:.4f}')} nat per ray",
     ]
 
 
 def _between(predicted: Predicted, form: str) -> str:
     value, low, high = (form.format(v) for v in predicted)
+    return f"{value} ({low} to {high})"
+
+
+def _factor(predicted: Predicted) -> str:
+    value, low, high = (rounded(v, 3) for v in predicted)
     return f"{value} ({low} to {high})"
 
 

@@ -118,6 +118,12 @@ class FitReport:
     symmetry: str = "none"
     effective_rays: float = math.nan
 
+    @property
+    def score_text(self) -> str:
+        """The score with its error, for people; a single ray that was held out says nothing of the error."""
+        error = f" ± {self.score_error:.4f}" if math.isfinite(self.score_error) else ""
+        return f"{self.score:.4f}{error} nat per ray"
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class EtendueDensity:

@@ -17,6 +17,7 @@ from etendue.lightfield.forecast import Forecast
 from etendue.plot import style
 from etendue.quantities.arguments import require
 from etendue.quantities.measured import measured
+from etendue.quantities.powers_of_ten import rounded
 from etendue.units import LUMINANCE_NAME, LUMINANCE_UNIT, FluxUnit
 
 if TYPE_CHECKING:
@@ -222,9 +223,10 @@ def _draw_law(axes: Axes, forecast: Forecast, n: npt.NDArray[np.float64]) -> Non
     wanted = 50.0 * now.value
     reach = [forecast.field_rays * factor for factor in (then.low, then.high)]
     axes.plot(reach, [wanted, wanted], color=style.LINES[2], linewidth=2.0, solid_capstyle="butt")
+    times, least, most = (rounded(factor, 2) for factor in then)
     axes.plot(
         [forecast.field_rays * then.value], [wanted], "D", color=style.LINES[2], markersize=4.5,
-        label=f"half the error: {then.value:.2g} times the rays ({then.low:.2g} to {then.high:.2g})",
+        label=f"half the error: {times} times the rays ({least} to {most})",
     )  # fmt: skip
     style.put_log_numbers(axes.yaxis)
 
@@ -263,8 +265,8 @@ def _facts(diagnostics: Diagnostics) -> Iterator[str]:
     yield f"{style.grouped(str(report.rays - report.unmet_rays))} rays"
     if report.unmet_rays:
         yield f"{style.grouped(str(report.unmet_rays))} more do not meet the surface"
-    score, lead = (text.replace("-", "−") for text in (f"{report.score:.4f}", f"{diagnostics.lead:+.4f}"))
-    yield f"held-out score {score} ± {report.score_error:.4f} nat per ray"
+    score, lead = (text.replace("-", "−") for text in (report.score_text, f"{diagnostics.lead:+.4f}"))
+    yield f"held-out score {score}"
     yield f"{lead} against the equal-étendue histogram"
     yield f"{style.grouped(f'{report.effective_cells:.0f}')} effective degrees of freedom"
     yield f"error bars predict a relative error of {style.percent(100 * diagnostics.expected_error)} at a ray"

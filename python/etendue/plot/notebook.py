@@ -93,7 +93,7 @@ def _(value: LightField) -> Iterator[str]:
             ("surface", str(value.surface.spec)),
             ("flux", counted(value.total_flux, value.flux_unit)),
             ("rays", f"{report.rays - report.unmet_rays:,}"),
-            ("held-out score", f"{report.score:.4f} ± {report.score_error:.4f} nat per ray"),
+            ("held-out score", report.score_text),
         ]
     )
     yield _notes(value.notes)

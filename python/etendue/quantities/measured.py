@@ -47,11 +47,13 @@ def measured_peak(found: Intensity) -> str:
     '500 ± 20 cd'
     >>> measured_peak(et.Intensity([0], [0, 60, 120, 180], [[500.0, 505, 498, 502]], 20.0))
     '494 ± 20 cd (largest value 505 cd, lifted by chance)'
+    >>> measured_peak(et.Intensity([0], [0, 60, 120, 180], [[50000.0, 50500, 49800, 50200]], 2000.0))
+    '49400 ± 2000 cd (largest value 50500 cd, lifted by chance)'
     """
     peak = measured(found.peak_intensity, found.peak_error, found.unit)
     if not found.maximum - found.peak_intensity > 0.5 * found.peak_error:
         return peak
-    return f"{peak} (largest value {found.maximum:.4g} {found.unit}, lifted by chance)"
+    return f"{peak} (largest value {counted(found.maximum, found.unit)}, lifted by chance)"
 
 
 def peak_line(found: Intensity) -> str:
