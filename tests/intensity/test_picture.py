@@ -45,6 +45,18 @@ def test_polar_curves_point_down_and_c_lies_on_the_right() -> None:
         assert points[:, 1].min() == pytest.approx(min(-1, -0.5 * max(right, left)), abs=0.7)
 
 
+def test_values_below_0_are_no_light_in_the_opposite_direction() -> None:
+    """Of 5 cd down, -3 cd at 45° in C0 and 3 cd in C180 nothing goes upwards, and nothing to the right beyond 45°."""
+    led = Intensity([0, 180], [0, 45, 90], [[5, -3, 0], [5, 3, 0]])
+    figure = plot_intensity(led)
+    x, y = curves(figure)["C0 – C180"].T
+    assert y.max() < 1e-9
+    assert x[np.abs(y) < 1e-9].max() < 1e-9
+    assert "values below 0 are drawn as 0" in " ".join(text.get_text() for text in figure.texts)
+    # On straight axes they are where they are.
+    assert curves(plot_intensity(led, kind="cartesian"))["C0 – C180"][:, 1].min() == -3.0
+
+
 def test_the_plane_of_the_maximum_is_added_if_it_is_another() -> None:
     values = np.ones((8, 3))
     values[5, 1] = 9.0  # C = 225°: the left half of the plane C45

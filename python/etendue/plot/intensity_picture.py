@@ -151,7 +151,10 @@ def plot_intensity(
         else:
             style.put_legend(ax, loc="best")
         return ax
-    facts = style.wrapped(_facts(intensity, sheet, per_klm=per_klm), WIDTH - 0.6)
+    told = [*_facts(intensity, sheet, per_klm=per_klm)]
+    if kind == "polar" and any((curve.values < 0.0).any() for curve in curves):
+        told.insert(-1, "values below 0 are drawn as 0")
+    facts = style.wrapped(told, WIDTH - 0.6)
     below = 0.3 + 0.15 * len(facts)
     left, bottom = (0.3, below) if kind == "polar" else (0.85, below + 0.42)
     height = bottom + high + ABOVE[kind]
@@ -266,8 +269,10 @@ def _polar(axes: Axes, curves: list[_Curve], names: tuple[str, str], reach: floa
         inner, outer = (np.maximum(curve.values + sign * curve.error, 0.0) for sign in (-1.0, 1.0))
         edge, back = np.concatenate([outer, inner[::-1]]), np.concatenate([angle, angle[::-1]])
         axes.fill(edge * np.sin(back), -edge * np.cos(back), color=colour, alpha=0.22, linewidth=0.0, zorder=2)
+        # A radius below 0 would be light in the opposite direction.
+        radius = np.maximum(curve.values, 0.0)
         axes.plot(
-            curve.values * np.sin(angle), -curve.values * np.cos(angle),
+            radius * np.sin(angle), -radius * np.cos(angle),
             color=colour, linewidth=1.2, label=curve.label, zorder=3,
         )  # fmt: skip
         for edge in np.radians([one for one in curve.edges if abs(one) <= reach]):
