@@ -30,7 +30,7 @@ def telling_media(rows: Sequence[Record], names: Sequence[str], wavelength: Arra
     ["the index of 'BK7'"]
     """
     for row, name in zip(rows, names, strict=True):
-        if _differs(_index(row["index"], wavelength)):
+        if _differs(index_of(row["index"], wavelength)):
             yield f"the index of {name!r}"
         absorption = row["absorption"]
         if _differs(np.interp(wavelength, absorption["wavelength"], absorption["per_mm"])):
@@ -64,7 +64,14 @@ def _tells(part: Record, wavelength: Array) -> bool:
     return any(map(_differs, shares))
 
 
-def _index(index: Record, wavelength: Array) -> Array:
+def index_of(index: Record, wavelength: Array) -> Array:
+    """The refractive index of a medium, as the core takes it, at some wavelengths [nm].
+
+    Examples
+    --------
+    >>> index_of({"kind": "constant", "n": 1.5}, np.array([450.0, 633.0]))
+    array([1.5, 1.5])
+    """
     if index["kind"] == "sellmeier":
         return Sellmeier(b=index["b"], c=index["c"]).index(wavelength)
     if index["kind"] == "table":

@@ -28,6 +28,7 @@ from etendue.scene.media_library import MEDIA
 from etendue.scene.overlaps import Kind, doubts_about
 from etendue.scene.scene import Scene
 from etendue.scene.shapes.shape import WHOLE
+from etendue.scene.stated_transmission import unrefracted
 from etendue.scene.things import Solid, Surface
 from etendue.units import FluxUnit
 
@@ -160,6 +161,10 @@ class _Compiler:
         record = {**self.rows, "faces": self.faces.rows()}
         for doubt in doubts_about(record, self.kinds, self.names["sources"]):
             self._doubt(doubt, 4)
+        for doubt in unrefracted(
+            record, [kind.name for kind in self.kinds], self.names["finishes"], self._wavelengths()
+        ):
+            self._doubt(doubt, 4)
         names = {key: tuple(held) for key, held in self.names.items()}
         return Compiled(
             record,
@@ -249,9 +254,13 @@ class _Compiler:
             self.named_finishes[given] = found
         return found
 
+    def _wavelengths(self) -> npt.NDArray[np.float64]:
+        """Those of the sources [nm]; that of the scene if there are none."""
+        return np.unique(np.concatenate(self.used)) if self.used else np.array([self.scene.wavelength])
+
     def _check_indices(self) -> None:
         """Every medium has an index at every wavelength of the sources; a library's range is a note."""
-        wavelength = np.unique(np.concatenate(self.used)) if self.used else np.array([self.scene.wavelength])
+        wavelength = self._wavelengths()
         for place, name, medium in self.media:
             with self._at(place):
                 index = medium.index_at(wavelength, self.files)
