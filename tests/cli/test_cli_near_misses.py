@@ -180,6 +180,9 @@ def test_messages_name_options(run: Run, lamp: Path, words: str, told: str) -> N
         ("fit map.npz -o a.h5", "this is a luminance or illuminance map, no ray file. etendue plot, filter, compare"),
         ("fit scene.toml -o a.h5", "this is a scene, no ray file. etendue info, trace, luminance, draw"),
         ("bsdf info scene.toml", "this is a scene, no BSDF"),
+        ("bsdf info finish.toml", "this is a finish, no BSDF. etendue goniometer takes it"),
+        ("fit finish.toml -o a.h5", "this is a finish, no ray file. etendue goniometer takes it"),
+        ("info finish.toml", "this is a finish, no ray file. etendue goniometer takes it"),
         ("bsdf info scan.xls", "this is a workbook of Excel, no BSDF. etendue bsdf fit takes scans"),
         ("info scan.xls", "this is a workbook of Excel, no ray file. etendue bsdf fit takes scans"),
         (
@@ -195,6 +198,7 @@ def test_a_file_of_another_kind_is_told_by_name(run: Run, lamp: Path, words: str
     et.write_intensity("lamp.ies", et.Intensity(c=[0], gamma=[0, 10, 90], values=[[9, 5, 0]]))
     scene = et.Scene(sources=[{"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 1}])
     scene.save("scene.toml")
+    Path("finish.toml").write_text('# paint\nkind = "gaussian"\npeak = 60.0\nsigma = 0.02\n', encoding="utf-8")
     Path("scan.xls").write_bytes(WORKBOOK_SIGNATURE + bytes(504))
     et.trace(scene, 10).save("result.h5")
     outcome = run(*words.split())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import re
 from pathlib import Path
 
 from etendue.formats.hdf5 import SIGNATURE
@@ -37,6 +38,7 @@ WORKBOOK = Kind(
     "a workbook of Excel", "etendue bsdf fit takes scans of the goniometer RT-300S; export other tables as text."
 )
 SCENE = Kind("a scene", "etendue info, trace, luminance, draw, sweep and view take it.")
+FINISH = Kind("a finish", "etendue goniometer takes it; in a scene it is one of the finishes.")
 BSDF = Kind(
     "scatter data (étendue BSDF)", "etendue bsdf info says what it holds; in a scene it is the file of a finish."
 )
@@ -47,14 +49,20 @@ OF_HDF5 = {
 }
 """By the attribute ``format``."""
 
+KIND_OF_FINISH = re.compile(rb"^[ \t]*kind[ \t]*=", re.MULTILINE)
+"""A key that scenes have in their tables only, and a finish by itself before any."""
+FIRST_TABLE = re.compile(rb"^[ \t]*\[", re.MULTILINE)
+
 
 def own_kind(head: Head) -> Kind | None:
-    """What a file is that étendue wrote, or reads as a scene or as scans: told without a reader of rays or of intensity.
+    """What a file is that étendue wrote, or reads as a scene, a finish or scans: told without readers of rays or intensity.
 
     Examples
     --------
     >>> own_kind(Head(Path("lamp.toml"), 17, b'name = "downlight"')).title
     'a scene'
+    >>> own_kind(Head(Path("paint.toml"), 19, b'kind = "lambertian"')).title
+    'a finish'
     """
     data = head.data
     if data.startswith(SIGNATURE):
@@ -64,7 +72,9 @@ def own_kind(head: Head) -> Kind | None:
     titles = (MAP_TITLE.encode("ascii"), ILLUMINANCE_TITLE.encode("ascii"))
     if (data.startswith(b"PK\x03\x04") and b"header.npy" in data[:128]) or data.startswith(titles):
         return MAP
-    return SCENE if head.path.suffix.lower() == ".toml" else None
+    if head.path.suffix.lower() != ".toml":
+        return None
+    return FINISH if KIND_OF_FINISH.search(FIRST_TABLE.split(data, 1)[0]) else SCENE
 
 
 def _of_hdf5(path: Path) -> Kind | None:
