@@ -100,3 +100,5 @@ def test_all_mistakes_of_the_scene_are_told_before_anything_is_drawn(run: Run, t
     assert "Did you mean 'silicone'?" in err
     assert "Did you mean 'mirror'?" in err
     assert not (tmp_path / "wrong.png").exists()
+    told = run("info", "wrong.toml")
+    assert (told.status, told.out, told.err) == (1, "", err)

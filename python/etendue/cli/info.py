@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from etendue.cli.terminal import complain, print_json, progress_bar, say
-from etendue.errors import ArgumentError, EtendueError
+from etendue.cli.terminal import complain, complain_of, print_json, progress_bar, say
+from etendue.errors import ArgumentError, EtendueError, SceneError
 
 if TYPE_CHECKING:
     from etendue.quantities.intensity import Intensity
@@ -45,7 +46,10 @@ def info(
         except (EtendueError, OSError) as error:
             failed = True
             reason = error.strerror if isinstance(error, OSError) else error
-            described.append(_plainly({"file": str(file), "error": str(reason)}))
+            facts = {"file": str(file), "error": str(reason)}
+            described.append(
+                Found(facts, partial(complain_of, error)) if isinstance(error, SceneError) else _plainly(facts)
+            )
     if json:
         print_json([found.facts for found in described])
     else:
