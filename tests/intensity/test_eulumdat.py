@@ -117,6 +117,28 @@ def test_what_the_table_does_not_rest_on_may_be_nonsense(read) -> None:
     ]
 
 
+@pytest.mark.parametrize("flux", ["1 000", "12 345.5", "1\N{NO-BREAK SPACE}000 lm", "1,000", "1'000", "1.000,5"])
+def test_a_flux_with_a_sign_between_thousands_is_refused(read, flux: str) -> None:
+    """It would be read as a thousandth of itself, and so would all intensities; 2,000 may be either."""
+    with pytest.raises(FormatError, match="line 29, flux of a lamp set"):
+        read(ldt(1, [0], [0, 90], [100, 50], sets=[(1, "LED", flux, "3000 K", "80", 12)]))
+
+
+def test_what_is_no_sign_between_thousands(read) -> None:
+    """A remark; three digits behind a decimal comma, where other numbers have one too."""
+    for flux, other, expected in (
+        ("500 lm", 50, 500),
+        ("500 2x36 W", 50, 500),
+        ("1,250", "50,5", 1.25),
+        ("0,750", 50, 0.75),
+    ):
+        led = read(ldt(1, [0], [0, 90], [100, other], sets=[(1, "LED", flux, "3000 K", "80", 12)]))
+        assert led.luminaire["lamp_flux"] == expected
+    # A size does not decide about the table: it is told and left out.
+    wide = read(ldt(1, [0], [0, 90], [100, 50], lines={13: "1 200"}))
+    assert any("line 13" in str(complaint) for complaint in wide.complaints)
+
+
 def test_sizes(read) -> None:
     """The length lies along C90-C270, the width along C0-C180; a width of 0 is a circle."""
     facts = read(ldt(1, [0], [0, 90], [100, 50])).luminaire

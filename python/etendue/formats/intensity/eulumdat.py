@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,10 @@ LAMP_FIELDS = ("lamps", "type", "flux", "colour", "colour_rendering", "power")
 FLUX_TOLERANCE = 0.05
 """Relative disagreement between the integral and the light output ratio that becomes a warning; coarse tables of narrow
 beams are off by up to 4.5 %."""
+
+_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:\s[0-9]{3})+(?![^\s.,])")
+_EITHER_COMMA = re.compile(r"[1-9][0-9]{0,2},[0-9]{3}")
+_DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
 
 
 def recognise(head: Head) -> bool:
@@ -76,6 +81,9 @@ class _Reader:
         word = _first_word(self.text(line, what))
         if not word:
             return None
+        if _THOUSANDS.match(self.text(line, what)):
+            found = f"{self.text(line, what)[:40]!r} has blanks between thousands"
+            raise FormatError(self.path, f"line {line}, {what}", found, "Write the number without them.")
         if "," in word and "." not in word:
             word = word.replace(",", ".")
             self.commas += 1
@@ -140,10 +148,20 @@ class _Reader:
                 what = f"{field} of a lamp set"
                 if field == "flux":
                     row[field] = self.value(line, what) or 0.0
+                    self._check_comma(line, what)
                 else:
                     row[field] = self.aside(line, what) if field in {"lamps", "power"} else self.text(line, what)
             sets.append(row)
         return sets
+
+    def _check_comma(self, line: int, what: str) -> None:
+        """Refuse a flux of which nobody knows whether its comma stands between thousands or before decimals."""
+        word = _first_word(self.text(line, what))
+        if _EITHER_COMMA.fullmatch(word) and not any(
+            _DECIMAL_COMMA.fullmatch(_first_word(other)) for n, other in enumerate(self.lines, 1) if n != line
+        ):
+            found = f"{word!r} may be {word.replace(',', '')} or {word.replace(',', '.')}: no other number has a comma"
+            raise FormatError(self.path, f"line {line}, {what}", found, "Write it without the comma, or with a point.")
 
     def _table(self, first: int, symmetry: Symmetry, n_c: int, n_gamma: int) -> tuple[Array, Array, Array]:
         """Angles and stored intensities [cd/klm]: from line `first` on, one number each, empty lines left out."""
