@@ -180,6 +180,14 @@ def test_a_gap_in_the_circle_is_named(read) -> None:
     assert "no plane between 210° and 360°" in str(led.complaints[0])
 
 
+def test_commas_that_may_stand_between_thousands_are_refused(read) -> None:
+    """1,250 is 1250 or 1.25 cd; beside 0,9 or 1000,5 it is 1.25."""
+    with pytest.raises(FormatError, match=r"numbers: '1,250' may be 1250 or 1\.250, and so every number with a comma"):
+        read(ies(values="1,250 1,100 980"))
+    assert read(ies(values="1,250 1,100 0,9")).values.tolist() == [[1.25, 1.1, 0.9]]
+    assert read(ies(values="1000,5 1,100 980")).values.tolist() == [[1000.5, 1.1, 980]]
+
+
 # --- keywords, tilt, unit, opening -----------------------------------------------------------------------------------
 
 

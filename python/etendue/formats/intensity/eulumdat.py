@@ -82,8 +82,8 @@ class _Reader:
         if not word:
             return None
         if _THOUSANDS.match(self.text(line, what)):
-            found = f"{self.text(line, what)[:40]!r} has blanks between thousands"
-            raise FormatError(self.path, f"line {line}, {what}", found, "Write the number without them.")
+            thousands = f"{self.text(line, what)[:40]!r} has blanks between thousands"
+            raise FormatError(self.path, f"line {line}, {what}", thousands, "Write the number without them.")
         if "," in word and "." not in word:
             word = word.replace(",", ".")
             self.commas += 1

@@ -43,6 +43,8 @@ _TILT = re.compile(r"\s*TILT\s*=\s*(.*?)\s*", re.IGNORECASE)
 _TAG = re.compile(r"\s*IES(?:NA)?\s*:?\s*(?:LM-63-)?(\d{4}|\d{2})\b", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"(?<![^\s])([+-]?\d+),(\d+(?:[eEdD][+-]?\d+)?)(?![^\s])", re.ASCII)
 """A word of its own; a list such as ``0,45,90`` is none."""
+_EITHER_COMMA = re.compile(r"[1-9][0-9]{0,2},[0-9]{3}")
+"""Its comma may as well stand between thousands."""
 _KEYWORD = re.compile(r"\s*\[\s*([^\]]*?)\s*\]\s*(.*?)\s*")
 
 
@@ -108,11 +110,19 @@ def read(path: Path) -> Intensity:
         return _Reader(path).intensity()
     except FormatError:
         # Decimal commas are certain only where the file makes no sense without them, and comes out even with them.
+        found, reader = None, None
         with contextlib.suppress(FormatError):
             reader = _Reader(path, decimal_commas=True)
-            if reader.commas:
-                return reader.intensity()
-        raise
+            found = reader.intensity() if reader.commas else None
+        if found is None or reader is None:
+            raise
+        if all(_EITHER_COMMA.fullmatch(word) for word in reader.commas):
+            word = reader.commas[0]
+            either = (
+                f"{word!r} may be {word.replace(',', '')} or {word.replace(',', '.')}, and so every number with a comma"
+            )
+            raise FormatError(path, "numbers", either, "Write them without commas, or with points.") from None
+        return found
 
 
 class _Reader:
@@ -120,7 +130,7 @@ class _Reader:
 
     def __init__(self, path: Path, *, decimal_commas: bool = False) -> None:
         self.path = path
-        self.commas = 0
+        self.commas: list[str] = []
         self.complaints: list[Complaint] = []
         self.lines = read_lines(path)
         tilts = [n for n, line in enumerate(self.lines) if _TILT.fullmatch(line)]
@@ -131,8 +141,10 @@ class _Reader:
         self.tilt = match[1] if match else ""
         self.words = _Words.of(path, self.lines, tilts[0] + 1, decimal_commas=decimal_commas)
         if decimal_commas:
-            self.commas = sum(len(_DECIMAL_COMMA.findall(line)) for line in self.lines[tilts[0] + 1 :])
-            found = f"{self.commas:,} have a decimal comma, which the standard does not know; it was read as a point"
+            self.commas = [m[0] for line in self.lines[tilts[0] + 1 :] for m in _DECIMAL_COMMA.finditer(line)]
+            found = (
+                f"{len(self.commas):,} have a decimal comma, which the standard does not know; it was read as a point"
+            )
             self.complain("warning", "numbers", found)
         self.keywords = self._keywords()
         self.version = self._version()
