@@ -418,8 +418,9 @@ def _extreme(step: Step, of: str, noun: str, choose: Callable[[Array], int]) -> 
 def _sum_error(step: Step, errors: Array) -> float:
     """Standard error of a sum over pixels, from the errors of its terms.
 
-    Lines of sight of different pixels are independent. What a light field does not know is common to many pixels: where
-    there is one, errors are added up as if all of them erred together, which is the most that they can.
+    Lines of sight of different pixels are independent, but for the noise of patches where they gather, which is common to
+    all pixels and is left out here. What a light field does not know is common to many pixels: where there is one, errors
+    are added up as if all of them erred together, which is the most that they can.
     """
     known = np.nan_to_num(errors)
     common = any(isinstance(source, Rays | Field | Gridded) for source in step.scene.sources)
