@@ -12,6 +12,7 @@ from etendue.cli.field import surface_option
 from etendue.cli.options import Flux, Json, Threads, Unit
 from etendue.cli.terminal import angles, check_outputs, complain, numbers, print_json, progress_bar, say
 from etendue.formats.rays import read_rays
+from etendue.luminance.framing import centre_of_light, probe
 from etendue.luminance.source_report import DISTANCE, report_source
 from etendue.plot.report_page import PAGE_TYPES, plot_report
 from etendue.quantities.observer import Observer
@@ -37,7 +38,10 @@ def report(
     target: Annotated[
         str | None,
         typer.Option(
-            "--target", help="Point that stated observers look at, in mm (0,0,0).", metavar="X,Y,Z", show_default=False
+            "--target",
+            help="Point that stated observers look at, in mm (where the light is).",
+            metavar="X,Y,Z",
+            show_default=False,
         ),
     ] = None,
     surface: Annotated[str, typer.Option("--surface", help="Carrier surface, as for fit.")] = "auto",
@@ -61,13 +65,15 @@ def report(
     """A source on one page: file facts and complaints, resolution, maps, intensity, how many rays more, provenance."""
     check_outputs(output, PAGE_TYPES)
     carrier = surface_option(surface)
-    views = None
-    if observer is not None:
-        x, y, z = (0.0, 0.0, 0.0) if target is None else numbers(target, 3, "--target", "0,0,0.3")
-        views = [Observer(theta, phi, distance, target=(x, y, z)) for theta, phi in angles(observer)]
-    elif target is not None or distance != DISTANCE:
+    stated = None if observer is None else angles(observer)
+    point = None if target is None else numbers(target, 3, "--target", "0,0,0.3")
+    if stated is None and (target is not None or distance != DISTANCE):
         raise typer.BadParameter("--target and --distance: for observers that are stated; give --observer too")
     rays = in_unit(with_flux(read_rays(file), flux), unit)
+    views = None
+    if stated is not None:
+        x, y, z = centre_of_light(probe(rays)) if point is None else point
+        views = [Observer(theta, phi, distance, target=(x, y, z)) for theta, phi in stated]
     with progress_bar("rays", (2 if forecast else 1) * len(rays)) as progress:
         found = report_source(
             rays,
