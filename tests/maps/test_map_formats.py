@@ -40,6 +40,7 @@ SHAPES = {
     "wide": make_map((3, 300)),
     "taller than a chunk": make_map((37, 11)),
     "radiance": make_map(flux_unit="W"),
+    "pixels that err together": make_map(common_error=0.0123),
     "fixed plane": make_map(screen=Screen(5, 6, 3, 4, "xy")),
     "no ray": LuminanceMap(
         np.full((4, 9), NAN), np.full((4, 9), NAN), np.zeros((4, 9)), Observer(0, 0, 1), Screen(1, 1, 9, 4)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from statistics import NormalDist
 
@@ -146,6 +147,19 @@ class Comparison:
         return (
             f"; a part of the map differs by {self.farthest:.1f} standard errors: leave gather out, or add forward_rays"
         )
+
+
+def common_spread(gathered: list[Array]) -> float:
+    """Relative standard error of all light of a map, of the `blocks` of its passes: patches lend their noise to all pixels.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> round(common_spread([np.array([1.0, 9.0]), np.array([3.0, 11.0])]), 3)     # 1/10
+    0.1
+    """
+    light = np.array([part[-1] for part in gathered])
+    return float(light.std(ddof=1) / (math.sqrt(len(light)) * light.mean())) if light.any() else 0.0
 
 
 UNKNOWN = "too few pixels with light for a comparison with lines of sight that go on to the sources"

@@ -36,6 +36,7 @@ class RegionStatistics:
         illuminance that no ray reached count as 0 ± 0.
     mean_error_apart : float
         The same if each pixel errs by itself, as those do that count rays: the root of the sum of squares over their number.
+        What a map says that all its pixels err by in common is added to it.
     maximum_apart : float
         The maximum less what chance lifts the largest of many pixels by, if each errs by itself
         (`etendue.quantities.unlifted`), in `unit`. The minimum is lowered by chance likewise.
@@ -143,11 +144,12 @@ def region_statistics(
         raise ArgumentError(f"region_statistics: all {int(inside.sum())} pixels in {region} are dead.")
     counted = inside if dead == "zero" else live
     values, errors = (np.where(lit, array, 0.0)[counted] for array in (lmap.values, lmap.standard_error))
+    common = lmap.common_error if isinstance(lmap, LuminanceMap) else 0.0
     mean, low, high = float(values.mean()), float(values.min()), float(values.max())
     return RegionStatistics(
         mean=mean,
         mean_error=float(errors.mean()),
-        mean_error_apart=float(np.sqrt((errors**2).sum()) / errors.size),
+        mean_error_apart=math.hypot(float(np.sqrt((errors**2).sum()) / errors.size), common * mean),
         minimum=low,
         maximum=high,
         maximum_apart=unlifted(values, np.nan_to_num(errors), np.ones(values.size)).value,

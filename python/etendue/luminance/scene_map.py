@@ -28,6 +28,7 @@ from etendue.luminance.gathering import (
     Comparison,
     Look,
     Pilot,
+    common_spread,
     survey_notes,
 )
 from etendue.luminance.methods import PathTracing
@@ -190,6 +191,7 @@ def look_at_scene(
                 compiled.flux_unit,
                 seen.origin.then(f"luminance by {paths:,} lines of sight per pixel, seed {how.seed}"),
                 (*told, *notes),
+                common,
             )
         )
     return maps
@@ -268,7 +270,7 @@ class _Eye:
             others = [sums[0] for sums in self.look(FIRST_CHECK, FIRST_CHECK + PILOT, None)]
             seen = Comparison.of(passes.blocks, others)
             if seen is None:
-                return passes, 0.0, [*told, UNKNOWN]
+                return passes, common_spread(passes.blocks), [*told, UNKNOWN]
             return passes, seen.bias, [*told, seen.sentence + (seen.warning if seen.differs else "")]
         if not self._may_gather() or not surveys.may_pay:
             return self._followed(None), 0.0, []

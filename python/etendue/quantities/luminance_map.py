@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar
+import math
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from etendue.quantities.arguments import require
+from etendue.errors import ArgumentError
+from etendue.quantities.arguments import require, require_number
 from etendue.quantities.observer import Observer, Screen, observer_from_dict, observer_to_dict
 from etendue.quantities.pixel_map import MapValues, PixelMap
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.relative_error import RelativeError
 from etendue.units import LUMINANCE_NAME, LUMINANCE_UNIT, MM2_PER_M2, FluxUnit
+
+FROM_0_ON = "a number from 0 on"
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -36,11 +40,14 @@ class LuminanceMap(PixelMap):
         Where it comes from.
     notes : tuple of str
         What the user should know: method, acceptance and why, dead pixels, skipped rays.
+    common_error : float
+        Standard error that all pixels have in common, relative to the luminance; it is part of `standard_error`, and does
+        not become less in means over pixels. 0 where none is known.
 
     Raises
     ------
     ArgumentError
-        If the arrays do not have the screen's shape.
+        If the arrays do not have the screen's shape, or the common error is no number from 0 on.
     UnknownNameError
         If there is no such unit of flux.
 
@@ -62,6 +69,7 @@ class LuminanceMap(PixelMap):
     flux_unit: FluxUnit = "lm"
     provenance: Provenance = dataclasses.field(default_factory=Provenance)
     notes: tuple[str, ...] = ()
+    common_error: float = 0.0
 
     UNITS: ClassVar = LUMINANCE_UNIT
     QUANTITIES: ClassVar = LUMINANCE_NAME
@@ -69,6 +77,9 @@ class LuminanceMap(PixelMap):
     def __post_init__(self) -> None:
         super().__post_init__()
         require(self.observer, Observer, "LuminanceMap: observer", "an Observer: et.Observer(theta, phi, distance)")
+        require_number(self.common_error, "LuminanceMap: common_error", FROM_0_ON)
+        if not 0.0 <= self.common_error < math.inf:
+            raise ArgumentError(f"LuminanceMap: common_error is {self.common_error!r}; give {FROM_0_ON}.")
 
     @property
     def dead_pixels(self) -> int:
@@ -88,6 +99,19 @@ class LuminanceMap(PixelMap):
         """
         apparent = self.screen.pixel_area / MM2_PER_M2 * self.screen.cosine(self.observer)
         return float(np.nansum(self.values * apparent))
+
+    def header(self) -> dict[str, Any]:
+        """Everything but the arrays, as plain data for file headers; the common error only if there is one."""
+        common = {"common_error": self.common_error} if self.common_error else {}
+        return super().header() | common
+
+    @classmethod
+    def from_header(
+        cls, header: dict[str, Any], values: MapValues, standard_error: MapValues, rays: npt.NDArray[np.int64]
+    ) -> Self:
+        """Inverse of `header`, for readers."""
+        found = super().from_header(header, values, standard_error, rays)
+        return found.replace(common_error=header.get("common_error", 0.0))
 
     def _geometry(self) -> dict[str, Any]:
         return {"observer": observer_to_dict(self.observer), "screen": dataclasses.asdict(self.screen)}

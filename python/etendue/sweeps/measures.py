@@ -370,7 +370,8 @@ def _mean(step: Step, of: str) -> Found:
     if isinstance(found, IlluminanceMap):
         area = found.screen.pixel_area / MM2_PER_M2 * int(inside.sum())
         return Found(value, _cells_error(found, step.traced, inside) / area, found.unit)
-    return Found(value, _sum_error(step, found.standard_error[inside] / int(inside.sum())), found.unit)
+    values, errors = (array[inside] / int(inside.sum()) for array in (found.values, found.standard_error))
+    return Found(value, _sum_error(step, found, values, errors), found.unit)
 
 
 @_noun("maximum", "luminance or illuminance of the brightest pixel", "map")
@@ -396,7 +397,8 @@ def _uniformity(step: Step, of: str) -> Found:
 def _intensity(step: Step, of: str) -> Found:
     found = step.maps[of]
     apparent = found.screen.pixel_area / MM2_PER_M2 * found.screen.cosine(found.observer)
-    return Found(found.intensity, _sum_error(step, apparent * found.standard_error), INTENSITY_UNIT[found.flux_unit])
+    values, errors = apparent * found.values, apparent * found.standard_error
+    return Found(found.intensity, _sum_error(step, found, values, errors), INTENSITY_UNIT[found.flux_unit])
 
 
 def _map(step: Step, of: str, noun: str) -> tuple[LuminanceMap | IlluminanceMap, npt.NDArray[np.bool_]]:
@@ -415,13 +417,14 @@ def _extreme(step: Step, of: str, noun: str, choose: Callable[[Array], int]) -> 
     return Found(float(values[at]), float(found.standard_error[inside][at]), found.unit)
 
 
-def _sum_error(step: Step, errors: Array) -> float:
-    """Standard error of a sum over pixels, from the errors of its terms.
+def _sum_error(step: Step, found: LuminanceMap, terms: Array, errors: Array) -> float:
+    """Standard error of a sum over pixels, from its terms and their errors.
 
-    Lines of sight of different pixels are independent, but for the noise of patches where they gather, which is common to
-    all pixels and is left out here. What a light field does not know is common to many pixels: where there is one, errors
-    are added up as if all of them erred together, which is the most that they can.
+    Lines of sight of different pixels are independent, but for what the map says that its pixels have in common. What a
+    light field does not know is common to many pixels: where there is one, errors are added up as if all of them erred
+    together, which is the most that they can.
     """
     known = np.nan_to_num(errors)
-    common = any(isinstance(source, Rays | Field | Gridded) for source in step.scene.sources)
-    return float(known.sum()) if common else float(np.sqrt((known**2).sum()))
+    if any(isinstance(source, Rays | Field | Gridded) for source in step.scene.sources):
+        return float(known.sum())
+    return math.hypot(float(np.sqrt((known**2).sum())), found.common_error * float(np.nan_to_num(terms).sum()))

@@ -9,7 +9,7 @@ use super::method::LeftOut;
 use super::path_block::{Branch, Connection, PathBlock, Seen};
 use crate::exitance_cells::FacePoint;
 use crate::guide::{self, Near};
-use crate::mis::density;
+use crate::mis::{density, power_weight};
 use crate::scatter::{Incoming, SurfaceEvent};
 use crate::transmittance::transmittance;
 
@@ -161,7 +161,7 @@ impl PathBlock<'_> {
             let mut share = branch.weight * colour[number] * light.f * light.cosine / picked;
             if beacon.density.is_finite() {
                 let mine = picked * beacon.density;
-                share *= mine / (mine + spread.density(k, &light, light.about));
+                share *= power_weight(mine, spread.density(k, &light, light.about));
             }
             self.shadows.push(interaction.point, k, interaction.origin_faces);
             self.connections.push(Connection {

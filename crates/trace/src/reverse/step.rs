@@ -11,6 +11,7 @@ use super::method::LeftOut;
 use super::path_block::{Branch, Path, PathBlock, PixelPass, Seen};
 use crate::glints::{Glints, led_on};
 use crate::interaction::interaction_of;
+use crate::mis::power_weight;
 use crate::scatter::{SPLIT, SurfaceEvent};
 use crate::scene::START;
 
@@ -135,7 +136,7 @@ impl PathBlock<'_> {
                     let distance = branch.travelled + hit.t;
                     let picked = if all { 1.0 } else { share };
                     let other = picked * hit.density() * distance * distance / hit.cosine;
-                    weight *= density / (density + other);
+                    weight *= power_weight(density, other);
                 }
                 path.sum[0] += weight * hit.luminance;
                 path.sum[1] += weight * hit.deviation;

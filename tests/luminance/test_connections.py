@@ -1,0 +1,57 @@
+"""Errors of light that lines of sight find both by connections to a lamp and by directions that happen to meet it."""
+
+from __future__ import annotations
+
+import etendue as et
+import numpy as np
+import numpy.typing as npt
+import pytest
+from oracles.verdicts import REVERSE, assert_agree
+
+Array = npt.NDArray[np.float64]
+
+AT, TOWARD, SIDE, FLUX, WHITE = np.array([12.0, -7.0, 100.0]), np.array([0.2, -0.3, -1.0]), 10.0, 500.0, 0.6
+TARGET, PIXELS, WIDTH = np.array([60.0, 30.0, 0.0]), 6, 6.0
+
+
+def turned(points: Array, *, normal: Array) -> Array:
+    """Points of the xy plane in one with this normal, by Rodrigues' rotation of +z to it."""
+    v = np.cross([0.0, 0.0, 1.0], normal)
+    cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+    return points @ (np.eye(3) + cross + cross @ cross / (1 + normal[2])).T
+
+
+def floor_luminance(*, points: Array) -> Array:
+    """ρ/π ∫ L cosθ₁ cosθ₂/d² dA over the lamp [cd/m²], by the midpoint rule: to 1e-6 at ten times the lamp's size."""
+    normal = TOWARD / np.linalg.norm(TOWARD)
+    side = ((np.arange(24) + 0.5) / 24 - 0.5) * SIDE
+    x, y = (axis.ravel() for axis in np.meshgrid(side, side))
+    to = points[:, None] - (AT + turned(np.column_stack([x, y, 0 * x]), normal=normal))
+    square = np.sum(to**2, axis=-1)
+    cosines = np.clip(to @ normal, 0, None) * np.clip(-to[..., 2], 0, None) / square
+    luminance = FLUX / (np.pi * SIDE**2 * 1e-6)
+    return WHITE / np.pi * luminance * np.sum(cosines / square, axis=1) * SIDE**2 / x.size
+
+
+@pytest.mark.parametrize(("theta", "lines", "seeds"), [(0, 256, 6), (0, 1024, 2), (75, 256, 5)])
+def test_a_small_lamp_over_a_floor(theta: float, lines: int, seeds: int) -> None:
+    """One line in some hundreds meets the lamp: a pixel without such a line must not lack what the others have by it."""
+    scene = et.Scene(
+        sources=[{"kind": "surface", "shape": {"kind": "rectangle", "width": SIDE, "height": SIDE}, "flux": FLUX,
+                  "at": AT.tolist(), "toward": TOWARD.tolist()}],
+        surfaces=[{"shape": {"kind": "rectangle", "width": 2000, "height": 2000},
+                   "finish": {"kind": "lambertian", "reflectance": WHITE}}],
+    )  # fmt: skip
+    observer, screen = et.Observer(theta, 0, 4e5, target=tuple(TARGET)), et.Screen(WIDTH, WIDTH, PIXELS, PIXELS, "xy")
+    # A point within each part of a pixel, all of which lie on the floor.
+    place = ((np.arange(4 * PIXELS) + 0.5) / (4 * PIXELS) - 0.5) * WIDTH
+    x, y = np.meshgrid(TARGET[0] + place, TARGET[1] - place)
+    fine = floor_luminance(points=np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3))
+    truth = fine.reshape(PIXELS, 4, PIXELS, 4).mean(axis=(1, 3))
+    maps = [et.luminance_map(scene, observer, screen, rays_per_pixel=lines, seed=seed) for seed in range(1, seeds + 1)]
+    assert_agree(
+        values=np.array([lmap.values for lmap in maps]),
+        expected=truth,
+        standard_error=np.array([lmap.standard_error for lmap in maps]),
+        degrees=REVERSE,
+    )
