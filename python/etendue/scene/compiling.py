@@ -161,10 +161,9 @@ class _Compiler:
         record = {**self.rows, "faces": self.faces.rows()}
         for doubt in doubts_about(record, self.kinds, self.names["sources"]):
             self._doubt(doubt, 4)
-        for doubt in unrefracted(
+        self.notes += unrefracted(
             record, [kind.name for kind in self.kinds], self.names["finishes"], self._wavelengths()
-        ):
-            self._doubt(doubt, 4)
+        )
         names = {key: tuple(held) for key, held in self.names.items()}
         return Compiled(
             record,

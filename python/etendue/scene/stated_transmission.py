@@ -33,8 +33,8 @@ def unrefracted(
     >>> record = compile_scene(Scene(solids=[slab])).record
     >>> glass = {"index": {"kind": "constant", "n": 1.5}}
     >>> told, = unrefracted({**record, "media": [record["media"][0], glass]}, ["slab"], ["opal"], np.array([555.0]))
-    >>> told[:52]
-    '"slab": its finish "opal" scatters light through a f'
+    >>> told[:50]
+    'slab: its finish "opal" scatters light through a f'
     """
     surroundings = index_of(record["media"][0]["index"], wavelength)
     through = np.array([any(map(scatters_through, parts_of(row))) for row in record["finishes"]], bool)
@@ -45,7 +45,7 @@ def unrefracted(
         if (np.abs(index - surroundings) > ALIKE).any():
             ratio = float((index / surroundings).max())
             yield (
-                f'"{solid_names[solid]}": its finish "{finish_names[finish]}" scatters light through a face between media '
+                f'{solid_names[solid]}: its finish "{finish_names[finish]}" scatters light through a face between media '
                 f"of unlike index by a stated share, which refracts nothing: luminances are wrong by a factor of up to "
                 f"{max(ratio, 1 / ratio) ** 2:.3g}; give ground glass a rough-interface, or lay the diffuser on a surface "
                 "of its own at a small distance from the solid"
