@@ -3,7 +3,7 @@
 //! A path starts at the observer, through a point of the pixel. While it meets smooth surfaces only, all its branches are followed,
 //! weak ones on some of many paths: that part of the image has hardly any noise but that of the places within the pixel and of
 //! sources that err. At a diffuse surface one direction is drawn, and points of the sources are connected to; a direction that
-//! both could find is shared out between them by the balance heuristic `[Veach1995]`.
+//! both could find is shared out between them by the power heuristic `[Veach1995]`.
 //!
 //! Radiance grows by (n₁/n₂)² on its way from a medium of index n₂ into one of n₁.
 
