@@ -113,6 +113,24 @@ def test_a_screen_that_misses_light_says_so(method: str) -> None:
     assert not any("the screen shows" in note for note in whole.notes)
 
 
+@pytest.mark.parametrize("wide", [True, False])
+def test_a_frame_about_few_rays_that_misses_light_of_their_field_says_so(*, wide: bool) -> None:
+    """60 rays of a strip, and the field of a plane on which some of their light lies far beside it."""
+    rng = np.random.default_rng(3)
+    place = np.column_stack([rng.uniform(-1, 1, 60), rng.uniform(-0.5, 0.5, 60), np.zeros(60)])
+    sine, turn = np.sqrt(rng.random(60)), 2 * np.pi * rng.random(60)
+    direction = np.column_stack([sine * np.cos(turn), sine * np.sin(turn), np.sqrt(1 - sine**2)])
+    rays = et.RaySet(place, direction, np.full(60, 100 / 60))
+    surface = et.Plane(0, 40, 40, centre=(3, 2)) if wide else et.Plane(0, 2, 1, centre=(0, 0))
+    lmap = et.luminance_map(rays, et.Observer(20, 0, 1000), method=et.FromField(surface=surface))
+    share = lmap.intensity / et.LightField.fit(rays, surface).intensity().at(0, 20)
+    told = [note for note in lmap.notes if note.startswith("the screen shows")]
+    assert bool(told) == bool(share < 0.9) == wide
+    for note in told:
+        # Of the field's light within 12° of the direction, which is not all alike.
+        assert float(note.split("shows ")[1].split("%")[0]) == pytest.approx(100 * share, abs=5)
+
+
 def test_a_map_that_shows_the_whole_field_asks_no_rays(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its intensity is that of the field towards the observer, which is a sum over the surface; drawn rays take 50 times as
     long."""

@@ -230,7 +230,7 @@ def luminance_map(
         for o, s in pairs:
             s.axes(o)  # a view without area is refused before the work
         field = fit_or_recall(source, how.surface, cache=cache, threads=threads, progress=progress)
-        maps = _with_missed(source, [look_at_field(field, o, s, how.samples, threads) for o, s in pairs])
+        maps = _with_missed(source, [look_at_field(field, o, s, how.samples, threads) for o, s in pairs], field)
     else:
         check_near_field(source)
         maps = _with_missed(source, look_through_cone(source, pairs, cast("Cone", how), threads, progress))
@@ -301,13 +301,23 @@ def _observer(given: Any, own: Mapping[str, ObserverKeys]) -> tuple[Observer, Sc
     return own[given].observer(), own[given].screen.screen()
 
 
-def _with_missed(source: RayStream | LightField, maps: list[LuminanceMap]) -> list[LuminanceMap]:
-    """The maps, with a note where a screen misses much of the light, or shows light that starts beyond the observer."""
+def _with_missed(
+    source: RayStream | LightField, maps: list[LuminanceMap], fitted: LightField | None = None
+) -> list[LuminanceMap]:
+    """The maps, with a note where a screen misses much of the light, or shows light that starts beyond the observer.
+
+    What maps of a field that was `fitted` miss is of its own light, which may be wider than that of few rays.
+    """
     if not source.total_flux > 0.0:
         return maps
-    if isinstance(source, LightField) and all(shows_whole(source, lmap) and is_far(source, lmap) for lmap in maps):
+    lit = source if fitted is None else fitted
+    whole = [isinstance(lit, LightField) and shows_whole(lit, lmap) for lmap in maps]
+    if isinstance(source, LightField) and all(whole) and all(is_far(source, lmap) for lmap in maps):
         return maps
     some = probe(source)
-    views = [(lmap.observer, lmap.screen) for lmap in maps]
-    notes = [(*missed_notes(some, *view), *beyond_notes(some, *view)) for view in views]
+    seen = some if lit is source or all(whole) else probe(lit)
+    notes = []
+    for lmap, all_of_it in zip(maps, whole, strict=True):
+        view = lmap.observer, lmap.screen
+        notes.append((*(() if all_of_it else missed_notes(seen, *view)), *beyond_notes(some, *view)))
     return [lmap.replace(notes=(*lmap.notes, *more)) if more else lmap for lmap, more in zip(maps, notes, strict=True)]
