@@ -197,7 +197,9 @@ def _curves(intensity: Intensity, reach: float) -> Iterator[_Curve]:
     c, row = _peak(intensity)
     if intensity.gamma[row] not in (0.0, 180.0) and intensity.c[c] % 90.0 != 0.0:
         plane = float(intensity.c[c]) % 180.0
-        yield _curve(intensity, plane, reach, f"C{plane:g} – C{plane + 180:g} (maximum)")
+        # The largest of all nodes may be so by noise, and lie in another plane.
+        kind = "maximum" if intensity.peak[0] % 180.0 == plane else "largest that is sure"
+        yield _curve(intensity, plane, reach, f"C{plane:g} – C{plane + 180:g} ({kind})")
 
 
 def _peak(intensity: Intensity) -> tuple[int, int]:
