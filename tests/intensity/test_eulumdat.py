@@ -55,11 +55,24 @@ def read(tmp_path: Path) -> object:
 )
 def test_symmetries_and_uneven_planes(read, isym: int, c: list[float], stored: int, expected: list[int]) -> None:
     """C90-C270 stores its planes from 270° over 0° to 90°."""
-    values = [1000 * plane + row for plane in range(stored) for row in (100, 50, 1)]
+    values = [value for plane in range(stored) for value in (100, 1000 * plane + 50, 1000 * plane + 1)]
     led = read(ldt(isym, c, [0, 45, 90], values))
     assert led.c.tolist() == (c if isym != 1 else [0])
     assert led.values[:, 1].tolist() == [(1000 * plane + 50) * 0.5 for plane in expected]
     assert not led.complaints
+
+
+@pytest.mark.parametrize("gamma", [0, 180])
+def test_planes_that_contradict_each_other_at_a_pole_are_told(read, gamma: int) -> None:
+    """All of them meet there. Measured ones differ by a per cent of the peak or so."""
+    rows = [0, 45, 90] if gamma == 0 else [90, 135, 180]
+    for other, told in ((470, False), (440, True)):
+        ends = [[500, 800, 60], [other, 700, 50]]
+        values = [value for plane in ends for value in (plane if gamma == 0 else plane[::-1])]
+        led = read(ldt(0, [0, 180], rows, values))
+        found = [complaint for complaint in led.complaints if complaint.place == f"intensities at γ = {gamma}°"]
+        assert len(found) == told
+        assert all("say 220 to 250 cd" in complaint.found for complaint in found)
 
 
 def test_absolute_intensity_is_that_of_the_first_lamp_set(read) -> None:

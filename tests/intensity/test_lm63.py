@@ -174,10 +174,11 @@ def test_planes_0_and_360_that_differ(read) -> None:
 
 
 def test_a_gap_in_the_circle_is_named(read) -> None:
+    gap = "no plane between"
     led = read(ies("IESNA:LM-63-1995", c="0 10 20 190", values=planes(4)))
-    assert not led.complaints
+    assert not any(gap in str(complaint) for complaint in led.complaints)
     led = read(ies("IESNA:LM-63-1995", c="0 70 140 210", values=planes(4)))
-    assert "no plane between 210° and 360°" in str(led.complaints[0])
+    assert f"{gap} 210° and 360°" in str(led.complaints[0])
 
 
 def test_commas_that_may_stand_between_thousands_are_refused(read) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import numpy as np
+
 from etendue.errors import ArgumentError, FormatError, UnknownNameError
 from etendue.formats.encodings import refuse_unmarked
 from etendue.formats.head import Head
@@ -14,6 +16,7 @@ from etendue.formats.intensity.intensity_format import IntensityFormat
 from etendue.formats.output import atomic_output
 from etendue.quantities.arguments import INTENSITY, require, require_known, require_number, require_path
 from etendue.quantities.intensity import Intensity
+from etendue.quantities.report import Complaint
 
 INTENSITY_FORMATS: dict[str, IntensityFormat] = {
     module.FORMAT.name: module.FORMAT for module in (eulumdat, lm63, tm33, gldf)
@@ -22,6 +25,9 @@ INTENSITY_FORMATS: dict[str, IntensityFormat] = {
 
 INTENSITY_EXTENSIONS: tuple[str, ...] = tuple(f.extension for f in INTENSITY_FORMATS.values() if f.write)
 """Extensions that choose a format for writing."""
+
+POLES_APART = 0.05
+"""Share of the largest intensity by which planes may differ where they meet without a word: measured ones do by 1 %."""
 
 PLANES_COUNTED_AS = {"lm63": "lm63", "tm33": "lm63", "eulumdat": "eulumdat"}
 """Which of the formats that can be written counts its planes C from the same side of a luminaire."""
@@ -93,12 +99,24 @@ def read_intensity(path: str | os.PathLike[str], photometry: str | None = None) 
         why = "this is no intensity distribution: it begins as none of the known formats do"
         raise FormatError(path, "first lines", why, f"Known are {known}.")
     if photometry is None:
-        return found.read(as_path(path))
+        return _with_poles_told(found.read(as_path(path)))
     if found.pick is None:
         raise ArgumentError(
             f"{path}: photometry {photometry!r}: {found.title} files hold one distribution; leave the name out."
         )
-    return found.pick(as_path(path), photometry)
+    return _with_poles_told(found.pick(as_path(path), photometry))
+
+
+def _with_poles_told(led: Intensity) -> Intensity:
+    """With a complaint if planes differ by much where they meet, which no source does: a table out of order, or damaged."""
+    told = []
+    for row in (0, -1):
+        apart = float(np.ptp(led.values[:, row]))
+        if led.gamma[row] in (0.0, 180.0) and apart > POLES_APART * led.maximum:
+            low, high = float(led.values[:, row].min()), float(led.values[:, row].max())
+            found = f"all planes meet there, and say {low:.6g} to {high:.6g} {led.unit}; they were taken as they are"
+            told.append(Complaint("warning", f"intensities at γ = {led.gamma[row]:g}°", found))
+    return led.replace(complaints=(*led.complaints, *told)) if told else led
 
 
 def write_intensity(
