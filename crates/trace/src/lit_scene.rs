@@ -4,9 +4,23 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use etendue_lightfield::View;
+use etendue_math::Vec3;
 use etendue_optics::light_sampler::LightSampler;
 
 use crate::scene::Scene;
+
+/// The share of picks of a source that goes by flux alone; the others go by flux over the square of the distance.
+const BY_FLUX: f64 = 0.5;
+
+/// A source among those of which one is picked.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    /// Of the flux.
+    share: f64,
+    /// The ball about it, with the square of its radius: infinite for what cannot be connected to.
+    centre: Vec3,
+    radius2: f64,
+}
 
 /// A scene with what its sources need to be looked at.
 #[derive(Clone, Debug)]
@@ -16,8 +30,7 @@ pub struct LitScene<'a> {
     pub(crate) light_samplers: &'a [Option<LightSampler>],
     /// Flux of all sources.
     pub(crate) flux: f64,
-    /// Sums of the shares of the sources' flux.
-    pub(crate) shares: Vec<f64>,
+    candidates: Vec<Candidate>,
     /// Wavelengths: sum of the shares, the wavelength, and how much of each source's flux has it, over its share.
     pub(crate) lines: Vec<(f64, f64, Vec<f64>)>,
     /// As of a run forwards.
@@ -64,16 +77,29 @@ impl<'a> LitScene<'a> {
             sum += share;
             lines.push((sum, wavelength, own.into_iter().map(|o| o / share).collect()));
         }
-        let mut below = 0.0;
-        let shares = scene.sources.iter().map(|s| {
-            below += s.flux / total;
-            below
+        let candidates = scene.sources.iter().zip(light_samplers).map(|(source, sampler)| {
+            let around = source.bounds();
+            let share = source.flux / total;
+            if sampler.is_none() || !around.is_finite() {
+                return Candidate {
+                    share,
+                    centre: Vec3::new(0.0, 0.0, 0.0),
+                    radius2: f64::INFINITY,
+                };
+            }
+            let half = (around.hi - around.lo) * 0.5;
+            Candidate {
+                share,
+                centre: around.lo + half,
+                // A point has no size, and may lie where the light falls.
+                radius2: half.dot(half).max(1e-12),
+            }
         });
         Self {
             scene,
             light_samplers,
             flux: total,
-            shares: shares.collect(),
+            candidates: candidates.collect(),
             lines,
             stop: None,
         }
@@ -86,6 +112,36 @@ impl<'a> LitScene<'a> {
             stop: Some(stop),
             ..self
         }
+    }
+
+    /// Sum of what [`Candidate::pull`] is at a point.
+    fn pull(&self, x: Vec3) -> f64 {
+        self.candidates.iter().map(|one| one.pull(x)).sum()
+    }
+
+    /// One source to connect a point to, and the chance that it is this one: by a number between 0 and 1. None without sources.
+    ///
+    /// By flux alone a weak lamp close by, which may bring most of the light, would be picked on one line of sight in thousands,
+    /// and the pixels whose lines all missed it would know nothing of it.
+    pub(crate) fn pick_source(&self, x: Vec3, mut number: f64) -> Option<(usize, f64)> {
+        let total = self.pull(x);
+        let mut last = None;
+        for (i, one) in self.candidates.iter().enumerate() {
+            let chance = one.chance(x, total);
+            if chance > 0.0 {
+                last = Some((i, chance));
+                number -= chance;
+                if number < 0.0 {
+                    break;
+                }
+            }
+        }
+        last
+    }
+
+    /// The chance that [`LitScene::pick_source`] picks a source.
+    pub(crate) fn pick_chance(&self, number: usize, x: Vec3) -> f64 {
+        self.candidates[number].chance(x, self.pull(x))
     }
 
     /// The columns and the rows of the pixels of a view, outside of which its lines of sight meet neither surface nor source.
@@ -112,5 +168,23 @@ impl<'a> LitScene<'a> {
     #[must_use]
     pub fn is_stopped(&self) -> bool {
         self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
+    }
+}
+
+impl Candidate {
+    /// How strongly it may light a point: its share of the flux over the square of the distance, or of its own radius if that is
+    /// larger.
+    fn pull(&self, x: Vec3) -> f64 {
+        let away = x - self.centre;
+        self.share / away.dot(away).max(self.radius2)
+    }
+
+    /// The chance that it is picked, where the pulls add up to `total`.
+    fn chance(&self, x: Vec3, total: f64) -> f64 {
+        if total > 0.0 {
+            BY_FLUX * self.share + (1.0 - BY_FLUX) * self.pull(x) / total
+        } else {
+            self.share
+        }
     }
 }

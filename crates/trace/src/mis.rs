@@ -52,17 +52,27 @@ pub fn density(view: &View, d: Vec3, distance: f64, cosine: f64) -> f64 {
     cosine.abs() * (t * t) / (distance * distance * area * slant.abs())
 }
 
+/// Ratio of two densities below which the rarer way has nothing: see [`power_weight`].
+const CUTOFF: f64 = 0.1;
+
 /// Weight of a sample that was drawn with the density `mine` where another way to draw it has the density `other`: the power
-/// heuristic with exponent 2 `[Veach1995]`.
+/// heuristic with exponent 2, and none for a way that is ten times as rare as the other `[Veach1995]`.
 ///
 /// Where a small source is connected to, a drawn direction meets it once in thousands of lines. By the balance heuristic it would
 /// bring as much light then as a connection does, and a pixel that has met no such line would know nothing of it: too low by what
-/// the others share out, which is more than the error its connections show. By squares what is missed is of second order.
+/// the others share out, which is more than the error its connections show. By squares what is missed is of second order, which
+/// connections to one of many lamps, spread evenly over the lines, still err less than.
 #[inline]
 #[must_use]
 pub fn power_weight(mine: f64, other: f64) -> f64 {
     let ratio = other / mine;
-    1.0 / (1.0 + ratio * ratio)
+    if ratio < CUTOFF {
+        1.0
+    } else if ratio > 1.0 / CUTOFF {
+        0.0
+    } else {
+        1.0 / (1.0 + ratio * ratio)
+    }
 }
 
 /// Reads the luminance of rays where they start.

@@ -61,6 +61,14 @@ impl Numbers {
         self.held[self.used as usize - 1]
     }
 
+    /// One that has nothing to do with the point: at a place of its own for each number that was drawn before.
+    #[inline]
+    #[must_use]
+    pub fn aside(&self) -> f64 {
+        let place = self.block << 16 | u64::from(self.fours) << 8 | u64::from(self.used);
+        self.stream.uniforms(self.index, 1 << 63 | place)[0]
+    }
+
     #[inline]
     fn refill(&mut self) {
         self.used = 0;

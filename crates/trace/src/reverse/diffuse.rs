@@ -13,7 +13,7 @@ use crate::mis::{density, power_weight};
 use crate::scatter::{Incoming, SurfaceEvent};
 use crate::transmittance::transmittance;
 
-/// Sources up to this number are all connected to at the first diffuse scatter; of more, one is drawn by its flux.
+/// Sources up to this number are all connected to at the first diffuse scatter; of more, one is drawn (`LitScene::pick_source`).
 const FEW: usize = 8;
 
 /// What is known of the light that a diffuse surface sends out.
@@ -135,20 +135,23 @@ impl PathBlock<'_> {
         let (scene, interaction) = (self.lit.scene, event.interaction());
         let line = self.paths[branch.path as usize].line as usize;
         let (_, _, colour) = &self.lit.lines[line];
-        let which = if all {
-            0..scene.sources.len()
+        let (which, picked) = if all {
+            (0..scene.sources.len(), 1.0)
         } else {
-            let number = self.numbers(branch.path).draw();
-            let last = scene.sources.len().saturating_sub(1);
-            let pick = self.lit.shares.partition_point(|s| *s < number).min(last);
-            pick..scene.sources.len().min(pick + 1)
+            // Moved at random within the distance of the lines of a pass: on a lattice alone the number of picks of a source
+            // would be the same in almost all passes, which tell nothing then of the few where it is another.
+            let lines = f64::from(self.method.paths.max(1));
+            let numbers = self.numbers(branch.path);
+            let number = (numbers.draw() + numbers.aside() / lines).fract();
+            let Some((pick, chance)) = self.lit.pick_source(interaction.point, number) else {
+                return;
+            };
+            (pick..pick + 1, chance)
         };
         for number in which {
             let Some(sampler) = &self.lit.light_samplers[number] else {
                 continue;
             };
-            let before = if number == 0 { 0.0 } else { self.lit.shares[number - 1] };
-            let picked = if all { 1.0 } else { self.lit.shares[number] - before };
             let source = &scene.sources[number];
             let Some(beacon) = sampler.pick(source, interaction.point, self.numbers(branch.path)) else {
                 continue;

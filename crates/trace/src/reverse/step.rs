@@ -71,10 +71,7 @@ impl PathBlock<'_> {
             &mut self.reach,
             starts.map(|(t, ((x, y), z))| t + START * (size(Vec3::new(*x, *y, *z)) + t)),
         );
-        let mut before = 0.0;
         for (number, source) in scene.sources.iter().enumerate() {
-            let share = self.lit.shares[number] - before;
-            before = self.lit.shares[number];
             let Some(sampler) = &self.lit.light_samplers[number] else {
                 continue;
             };
@@ -134,7 +131,12 @@ impl PathBlock<'_> {
                 }
                 if let Seen::Diffuse { density, all } = branch.seen {
                     let distance = branch.travelled + hit.t;
-                    let picked = if all { 1.0 } else { share };
+                    // Where the branch was scattered: faces that do nothing to light may lie in between.
+                    let picked = if all {
+                        1.0
+                    } else {
+                        lit.pick_chance(number, lines.origin(i) - lines.direction(i) * branch.travelled)
+                    };
                     let other = picked * hit.density() * distance * distance / hit.cosine;
                     weight *= power_weight(density, other);
                 }
