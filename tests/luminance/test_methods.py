@@ -72,7 +72,7 @@ def fits(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(estimate, "fit_or_recall", fit)
     # What a screen misses is told by rays that are drawn for each map, whatever the options.
-    monkeypatch.setattr(estimate, "_with_missed", lambda _, maps: maps)
+    monkeypatch.setattr(estimate, "_with_missed", lambda _, maps, __=None: maps)
 
 
 READERS: dict[str, Callable[[Path], Any]] = {

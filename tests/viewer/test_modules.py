@@ -79,7 +79,7 @@ def test_pixels_are_those_of_the_cores_map(modules: Path, name: str, monkeypatch
     No part of the surfaces is thinner than two pixels here: of those that are the core adds up the light over their outline.
     """
     # What a screen misses is told by rays that are drawn for each, and is not looked at here.
-    monkeypatch.setattr("etendue.luminance.estimate._with_missed", lambda _, maps: maps)
+    monkeypatch.setattr("etendue.luminance.estimate._with_missed", lambda _, maps, __=None: maps)
     field = make_field(SURFACES[name], seed=8)
     tables = FieldTables.of(field)
     columns, rows = 12, 8
