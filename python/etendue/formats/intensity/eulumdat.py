@@ -11,7 +11,14 @@ import numpy as np
 from etendue.errors import FormatError
 from etendue.formats.head import Head, file_provenance
 from etendue.formats.intensity.eulumdat_writer import write
-from etendue.formats.intensity.intensity_format import DAMAGED, IntensityFormat, number, read_lines, scaled
+from etendue.formats.intensity.intensity_format import (
+    DAMAGED,
+    IntensityFormat,
+    either_comma,
+    number,
+    read_lines,
+    scaled,
+)
 from etendue.formats.intensity.symmetry import Array, unfolded
 from etendue.quantities.intensity import UNTURNED, Intensity, Symmetry
 from etendue.quantities.report import Complaint, Severity
@@ -30,7 +37,6 @@ FLUX_TOLERANCE = 0.05
 beams are off by up to 4.5 %."""
 
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:\s[0-9]{3})+(?![^\s.,])")
-_EITHER_COMMA = re.compile(r"[1-9][0-9]{0,2},[0-9]{3}")
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
 
 
@@ -157,10 +163,11 @@ class _Reader:
     def _check_comma(self, line: int, what: str) -> None:
         """Refuse a flux of which nobody knows whether its comma stands between thousands or before decimals."""
         word = _first_word(self.text(line, what))
-        if _EITHER_COMMA.fullmatch(word) and not any(
+        either = either_comma(word)
+        if either is not None and not any(
             _DECIMAL_COMMA.fullmatch(_first_word(other)) for n, other in enumerate(self.lines, 1) if n != line
         ):
-            found = f"{word!r} may be {word.replace(',', '')} or {word.replace(',', '.')}: no other number has a comma"
+            found = f"{either}: no other number has a comma"
             raise FormatError(self.path, f"line {line}, {what}", found, "Write it without the comma, or with a point.")
 
     def _table(self, first: int, symmetry: Symmetry, n_c: int, n_gamma: int) -> tuple[Array, Array, Array]:

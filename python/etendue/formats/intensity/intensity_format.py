@@ -25,6 +25,8 @@ MOST_BYTES = 1 << 27
 LARGEST_INTENSITY = 1e35
 """cd or W/sr: the sun has 3e27 cd. What is larger is a slip, and sums and squares of it may leave the numbers."""
 
+_EITHER_COMMA = re.compile(r"[1-9][0-9]{0,2},[0-9]{3}")
+
 DAMAGED = "The file is damaged or cut short; ask for it again."
 
 SPELT_OUT = {
@@ -83,6 +85,19 @@ def read_bytes(path: Path) -> bytes:
     if size > MOST_BYTES:
         raise FormatError(path, "size", f"{size:,} bytes, far more than a distribution", "Give an intensity file.")
     return path.read_bytes()
+
+
+def either_comma(word: str) -> str | None:
+    """What is to be said of a number whose comma may stand before decimals or between thousands; None of any other.
+
+    Examples
+    --------
+    >>> either_comma("1,250"), either_comma("0,9"), either_comma("1000,5")
+    ("'1,250' may be 1250 or 1.250", None, None)
+    """
+    if not _EITHER_COMMA.fullmatch(word):
+        return None
+    return f"{word!r} may be {word.replace(',', '')} or {word.replace(',', '.')}"
 
 
 def read_lines(path: Path) -> list[str]:

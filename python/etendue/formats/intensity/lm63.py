@@ -18,6 +18,7 @@ from etendue.formats.intensity.intensity_format import (
     DAMAGED,
     LARGEST_INTENSITY,
     IntensityFormat,
+    either_comma,
     number,
     read_lines,
     scaled,
@@ -43,8 +44,6 @@ _TILT = re.compile(r"\s*TILT\s*=\s*(.*?)\s*", re.IGNORECASE)
 _TAG = re.compile(r"\s*IES(?:NA)?\s*:?\s*(?:LM-63-)?(\d{4}|\d{2})\b", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"(?<![^\s])([+-]?\d+),(\d+(?:[eEdD][+-]?\d+)?)(?![^\s])", re.ASCII)
 """A word of its own; a list such as ``0,45,90`` is none."""
-_EITHER_COMMA = re.compile(r"[1-9][0-9]{0,2},[0-9]{3}")
-"""Its comma may as well stand between thousands."""
 _KEYWORD = re.compile(r"\s*\[\s*([^\]]*?)\s*\]\s*(.*?)\s*")
 
 
@@ -116,11 +115,8 @@ def read(path: Path) -> Intensity:
             found = reader.intensity() if reader.commas else None
         if found is None or reader is None:
             raise
-        if all(_EITHER_COMMA.fullmatch(word) for word in reader.commas):
-            word = reader.commas[0]
-            either = (
-                f"{word!r} may be {word.replace(',', '')} or {word.replace(',', '.')}, and so every number with a comma"
-            )
+        if all(map(either_comma, reader.commas)):
+            either = f"{either_comma(reader.commas[0])}, and so every number with a comma"
             raise FormatError(path, "numbers", either, "Write them without commas, or with points.") from None
         return found
 
