@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import hypothesis
@@ -27,6 +28,14 @@ COUNTED = {NO_SAMPLES: "the sample files are not there", NO_BROWSER: NO_BROWSER,
 """Reasons for which tests are skipped that are counted at the end, and what is said of them."""
 
 ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _no_waiting_for_disks() -> Iterator[None]:
+    """What a test writes need not outlive a power cut: `tests/maps/test_output.py` looks that files are flushed."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", os.fstat)  # which fails for the same handles
+        yield
 
 
 @pytest.fixture(scope="session")

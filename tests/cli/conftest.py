@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -9,11 +10,15 @@ from typing import Any, Literal
 
 import etendue as et
 import pytest
+import typer.main
 from etendue.cli import main
 from etendue.lightfield.carrier import Surface
 from etendue.quantities.ray_stream import RayStream
 
 from cli.outcome import Outcome, Run
+
+# What the options of all verbs are: found out once, as in a process of the program, and not for each call of a test.
+verbs_of = functools.cache(typer.main.get_command)
 
 
 @pytest.fixture
@@ -21,6 +26,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
     """Run the program in an empty folder, in this process."""
     monkeypatch.setenv("COLUMNS", "300")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(typer.main, "get_command", verbs_of)
 
     def call(*arguments: object) -> Outcome:
         capsys.readouterr()

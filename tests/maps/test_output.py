@@ -24,6 +24,22 @@ def test_new_file_appears_whole(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [target]
 
 
+@pytest.mark.skipif(os.name != "posix", reason="only POSIX systems flush folders")
+def test_what_is_written_outlives_a_power_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The content is flushed before the file takes its name, and the name afterwards."""
+    target, flushed = tmp_path / "map.csv", []
+
+    def flush(handle: int) -> None:
+        number = os.fstat(handle).st_ino
+        content = "its name" if number == tmp_path.stat().st_ino else os.pread(handle, 99, 0).decode()
+        flushed.append((content, target.exists()))
+
+    monkeypatch.setattr(os, "fsync", flush)
+    with atomic_output(target) as temporary:
+        temporary.write_text("whole")
+    assert flushed == [("whole", False), ("its name", True)]
+
+
 @pytest.mark.parametrize("failure", [RuntimeError, KeyboardInterrupt, SystemExit, MemoryError])
 @pytest.mark.parametrize("existing", [True, False])
 def test_failure_leaves_the_old_file_and_no_litter(

@@ -12,18 +12,37 @@ from oracles import workers
 pytest_plugins = ["pytester"]
 
 
-@pytest.mark.parametrize(("shared", "grouped"), [("module", 2), ("function", 0)])
-def test_tests_that_share_a_fixture_stay_together(pytester: pytest.Pytester, shared: str, grouped: int) -> None:
-    """The tests of a file that ask for its fixture have one group, the other test none."""
-    path = pytester.makepyfile(
-        f"import pytest\n@pytest.fixture(scope='{shared}')\ndef field(): return 1\n"
-        "def test_a(field): pass\ndef test_b(): pass\ndef test_c(field): pass\n"
-    )
+def groups_of(pytester: pytest.Pytester, text: str) -> list[str | None]:
+    """The group of each test of a file, after the name of its module."""
+    path = pytester.makepyfile(text)
     items = pytester.getitems(path.read_text(encoding="utf-8"))
     workers.pytest_collection_modifyitems(items)
-    groups = [mark.args[0] for item in items for mark in item.iter_markers("xdist_group")]
-    assert len(groups) == grouped
-    assert len(set(groups)) <= 1
+    marks = [[mark.args[0] for mark in item.iter_markers("xdist_group")] for item in items]
+    assert all(len(groups) <= 1 for groups in marks)
+    modules = [item.nodeid.partition("::")[0] for item in items]
+    return [groups[0].removeprefix(module) if groups else None for groups, module in zip(marks, modules, strict=True)]
+
+
+@pytest.mark.parametrize(("shared", "group"), [("module", ""), ("function", None)])
+def test_tests_that_share_a_fixture_stay_together(pytester: pytest.Pytester, shared: str, group: str | None) -> None:
+    """The tests of a file that ask for its fixture have one group, the other test none."""
+    found = groups_of(
+        pytester,
+        f"import pytest\npytestmark = pytest.mark.slow\n@pytest.fixture(scope='{shared}')\ndef field(): return 1\n"
+        "def test_a(field): pass\ndef test_b(): pass\ndef test_c(field): pass\n",
+    )
+    assert found == [group, None, group]
+
+
+def test_quick_tests_go_to_workers_in_lots(pytester: pytest.Pytester) -> None:
+    """Slow ones between them go one by one, and those that share a fixture stay together."""
+    found = groups_of(
+        pytester,
+        "import pytest\n@pytest.fixture(scope='module')\ndef field(): return 1\n"
+        f"@pytest.mark.parametrize('k', range({workers.LOT - 1}))\ndef test_a(k): pass\n"
+        "@pytest.mark.slow\ndef test_b(): pass\ndef test_c(field): pass\ndef test_d(): pass\ndef test_e(): pass\n",
+    )
+    assert found == [" 0"] * (workers.LOT - 1) + [None, "", " 0", " 1"]
 
 
 @pytest.mark.slow

@@ -162,11 +162,10 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(TimeBudget(whole=not chosen, strict=config.option.strict_times), "time-budget")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the examples that are slow."""
-    for item in items:
-        if isinstance(item, pytest.DoctestItem) and item.name in SLOW_EXAMPLES:
-            item.add_marker("slow")
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Mark the examples that are slow, before anybody asks which tests are."""
+    if isinstance(item, pytest.DoctestItem) and item.name in SLOW_EXAMPLES:
+        item.add_marker("slow")
 
 
 def measured(item: pytest.Item, name: str) -> Iterator[None]:

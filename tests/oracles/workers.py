@@ -1,13 +1,17 @@
 """A pytest plugin for runs with several workers (``pytest -n auto``).
 
 Tests that share a fixture of their module run on one worker, which makes it once; all others go to whichever worker is
-free. Workers share the cores: each has as many threads as its part, also where a test leaves the number to the core.
+free. Quick ones go there in lots: to hand out one test, xdist counts all that it has handed out before, which for
+thousands of tests one by one takes as long as they do. Workers share the cores: each has as many threads as its part,
+also where a test leaves the number to the core.
 """
 
 from __future__ import annotations
 
 import gc
+import linecache
 import os
+from collections import Counter
 from typing import Any
 
 import pytest
@@ -15,16 +19,23 @@ import pytest
 THREADS = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 """Environment variables that say how many threads there are: of the core, and of libraries that numpy may use."""
 
+LOT = 16
+"""Quick tests of a module that are handed out together."""
+
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep tests together that share a fixture of their module."""
+    """Keep tests together that share a fixture of their module, and quick ones in lots."""
+    quick: Counter[str] = Counter()
     for item in items:
         module = item.nodeid.partition("::")[0]
         definitions = getattr(item, "_fixtureinfo", None)
         known = definitions.name2fixturedefs.values() if definitions else ()
         if any(found[-1].scope == "module" and found[-1].baseid == module for found in known):
             item.add_marker(pytest.mark.xdist_group(module))
+        elif not item.get_closest_marker("slow"):
+            item.add_marker(pytest.mark.xdist_group(f"{module} {quick[module] // LOT}"))
+            quick[module] += 1
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -38,6 +49,8 @@ def pytest_xdist_setupnodes(specs: list[Any]) -> None:
 @pytest.hookimpl(trylast=True)
 def pytest_collection_finish() -> None:
     """Leave what was collected out of Python's search for garbage: millions of objects that stay to the end, which it would
-    look through again and again, for more than 1 % of the time of the tests."""
+    look through again and again, for more than 1 % of the time of the tests. Forget the text of all modules: each example
+    in a docstring would look whether any of their files has changed, for another 1 %."""
+    linecache.clearcache()
     gc.collect()
     gc.freeze()
