@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pytest
 from etendue import _core
 from etendue.luminance import scene_map
-from etendue.luminance.gathering import BLOCKS, LEAST_LINES, MOST_COLOURS, NOT_TAKEN, PILOT, Comparison, blocks
+from etendue.luminance.gathering import BLOCKS, LEAST_LINES, NOT_TAKEN, PILOT, Comparison, blocks
 from etendue.quantities.bsdf_data import BsdfData
 from etendue.quantities.bsdf_directions import direction
 from etendue.quantities.bsdf_slice import BsdfSlice
@@ -404,22 +404,6 @@ def test_colours_and_light_fields_are_gathered_too() -> None:
     error = np.hypot(known.standard_error, image.standard_error)
     assert np.median(error[clear] / image.values[clear]) < 0.03
     assert_agree(values=known.values[clear], expected=image.values[clear], standard_error=error[clear], degrees=REVERSE)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("spread", [8, 9])
-def test_it_is_not_tried_of_many_colours(spread: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each patch has cells for each of them; no survey is made then."""
-    surveys: list[int] = []
-    real = _core.Survey
-    monkeypatch.setattr(_core, "Survey", lambda *arguments: surveys.append(1) or real(*arguments))
-    spectrum = [[400 + 30 * i, 1.0 + i] for i in range(spread)]
-    lamp = {"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 5, "at": [0, 0, 9], "toward": [0, 0, -1],
-            "spectrum": spectrum}  # fmt: skip
-    plate = {"shape": {"kind": "rectangle", "width": 40, "height": 30}, "finish": WHITE}
-    scene = et.Scene(sources=[lamp], surfaces=[plate])
-    et.luminance_map(scene, et.Observer(30, 40, 300), et.Screen(20, 20, 64, 64), rays_per_pixel=128)
-    assert len(surveys) == (spread <= MOST_COLOURS)
 
 
 def test_it_is_not_tried_where_rays_hardly_end() -> None:

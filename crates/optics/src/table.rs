@@ -148,6 +148,13 @@ impl Table {
         self.values.iter().all(|value| *value == first).then_some(first)
     }
 
+    /// Whether it is not the same at all wavelengths.
+    #[must_use]
+    pub fn depends_on_wavelength(&self) -> bool {
+        let rows = self.values.chunks(self.wavelength.len());
+        rows.into_iter().any(|row| row.iter().any(|value| *value != row[0]))
+    }
+
     /// Whether it is not the same at all angles.
     #[must_use]
     pub fn depends_on_angle(&self) -> bool {

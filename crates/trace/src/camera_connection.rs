@@ -78,12 +78,12 @@ fn passes(event: &ScatterEvent, scene: &Scene, view: &View, sight: &Sight, media
     let stack = sight.stack;
     transmittance(
         scene,
-        event.point,
-        view.observer,
+        [event.point, view.observer],
         event.origin_faces,
         stack,
         media,
         event.wavelength,
+        |_, _| {},
     )
 }
 

@@ -53,6 +53,10 @@ const MOST_PATCHES: f64 = 65_536.0;
 /// Distance from which a patch counts as smooth, in sides of it.
 const NEAR: f64 = 2.0;
 
+/// Wavelengths at each of which the light of patches is known, at most: of more, each has too few rays and too much room. Lines of
+/// sight on which something was selective then go on.
+const FEW_WAVELENGTHS: usize = 8;
+
 /// What the seed is mixed with, so that no ray of a survey is one of a light image or a trace of the same seed.
 const SURVEY: u64 = 0x5355_5256;
 
@@ -79,7 +83,8 @@ pub struct ExitanceSurvey {
 #[derive(Clone, Debug)]
 pub struct ExitanceCache<'a> {
     survey: &'a ExitanceSurvey,
-    /// Of each side of each patch, for each wavelength: without the light that may be left to the light image, and of all.
+    /// Of each side of each patch, at each wavelength, over the probability that a line of sight has it, and at all of them
+    /// together: without the light that may be left to the light image, and of all.
     luminance: Vec<[f64; 2]>,
 }
 
@@ -92,7 +97,13 @@ impl ExitanceSurvey {
     #[must_use]
     pub fn new(lit: &LitScene<'_>, seed: u64, most_events: u32) -> Self {
         let (scene, seed) = (lit.scene, seed ^ SURVEY);
-        let wavelengths: Vec<f64> = lit.lines.iter().map(|line| line.1).collect();
+        // A single one stands for all of them.
+        let told = if lit.wavelengths.count() > FEW_WAVELENGTHS {
+            1
+        } else {
+            lit.wavelengths.count()
+        };
+        let wavelengths: Vec<f64> = lit.wavelengths.all().take(told).collect();
         let own = |(face, role): (&Face, &Role)| {
             let Act::Optical(finish) = role.act else { return None };
             let bsdf = &*scene.finishes[finish as usize];
@@ -194,14 +205,8 @@ impl ExitanceSurvey {
         let batches = (2 * lines / (LINES * FEW)).clamp(EACH[0], EACH[1]);
         // The rays stand for the whole run.
         let scale = RUN as f64 / (batches * FEW) as f64;
-        let lines = lit.lines.len();
-        let mut below = 0.0;
-        let shares: Vec<f64> = lit
-            .lines
-            .iter()
-            .map(|line| line.0 - std::mem::replace(&mut below, line.0))
-            .collect();
-        let mut luminance = vec![[0.0; 2]; self.sides.len() * lines];
+        let lines = self.patches.wavelengths.len();
+        let mut luminance = vec![[0.0; 2]; self.sides.len() * (lines + 1)];
         let (run, mut round) = (run_of(lit, self.seed, self.most_events), self.round * (BATCH / FEW));
         trace(
             lit,
@@ -213,10 +218,14 @@ impl ExitanceSurvey {
                 for (number, pair) in cells.chunks(2).enumerate() {
                     let (side, line) = (number / lines, number % lines);
                     let side = side / (2 * BINS as usize) * 2 + side % 2;
-                    let unit = scale * FRAC_1_PI / (self.sides[side][0] * shares[line]);
-                    let found = &mut luminance[side * lines + line];
-                    found[0] += pair[0].sum * unit;
-                    found[1] += (pair[0].sum + pair[1].sum) * unit;
+                    let unit = scale * FRAC_1_PI / self.sides[side][0];
+                    let light = [pair[0].sum * unit, (pair[0].sum + pair[1].sum) * unit];
+                    for (column, chance) in [(line, lit.wavelengths.chance(line)), (lines, 1.0)] {
+                        let found = &mut luminance[side * (lines + 1) + column];
+                        for (found, light) in found.iter_mut().zip(light) {
+                            *found += light / chance;
+                        }
+                    }
                 }
             },
         );
@@ -265,13 +274,24 @@ fn trace(
 }
 
 impl ExitanceCache<'_> {
-    /// The luminance of a point of a face at one of the wavelengths, seen from a distance: of all light, or without that
-    /// which is left to the light image; None if it is not known.
+    /// The luminance of a point of a face, seen from a distance: of all light, or without that which is left to the light image.
+    /// On a line of sight that has one of the wavelengths because something on it was selective, or on any (None). None if it is
+    /// not known.
     #[inline]
     #[must_use]
-    pub fn at(&self, scene: &Scene, place: FacePoint, distance: f64, line: usize, all: bool) -> Option<f64> {
-        let side = self.survey.side(scene, place)?;
+    pub fn at(
+        &self,
+        lit: &LitScene<'_>,
+        place: FacePoint,
+        distance: f64,
+        line: Option<usize>,
+        all: bool,
+    ) -> Option<f64> {
+        let side = self.survey.side(lit.scene, place)?;
         let lines = self.survey.patches.wavelengths.len();
-        (distance > self.survey.sides[side][1]).then(|| self.luminance[side * lines + line][usize::from(all)])
+        // What is selective has no light that is known for all wavelengths together only.
+        let is_told = line.is_none() || lines == lit.wavelengths.count();
+        let place = side * (lines + 1) + line.unwrap_or(lines);
+        (is_told && distance > self.survey.sides[side][1]).then(|| self.luminance[place][usize::from(all)])
     }
 }

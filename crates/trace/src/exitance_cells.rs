@@ -11,7 +11,7 @@ pub struct ExitanceCells {
     pub faces: Vec<Option<(Chart, u32)>>,
     /// Of all faces.
     pub bins: u32,
-    /// \[nm\].
+    /// \[nm\], rising; a single one stands for all.
     pub wavelengths: Vec<f64>,
 }
 
@@ -49,12 +49,21 @@ impl ExitanceCells {
         Some(2 * bin + u32::from(place.front))
     }
 
-    /// The cell of light of a wavelength that leaves a point of a face; light that the reverse tracer may leave to the light
-    /// image has cells of its own.
+    /// The number of the wavelength next to one; None if there are none.
+    fn nearest(&self, wavelength: f64) -> Option<usize> {
+        let last = self.wavelengths.len().checked_sub(1)?;
+        let above = self.wavelengths.partition_point(|one| *one < wavelength).min(last);
+        let below = above.saturating_sub(1);
+        let [low, high] = [below, above].map(|line| (self.wavelengths[line] - wavelength).abs());
+        Some(if low < high { below } else { above })
+    }
+
+    /// The cell of light of a wavelength, or of the one nearest to it, that leaves a point of a face; light that the reverse tracer
+    /// may leave to the light image has cells of its own.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, reason = "a cell has a number below 2^32")]
     pub fn cell(&self, faces: &[Face], place: FacePoint, wavelength: f64, unseen: bool) -> Option<u32> {
-        let line = self.wavelengths.iter().position(|w| *w == wavelength)?;
+        let line = self.nearest(wavelength)?;
         let cell = self.side(faces, place)? * self.wavelengths.len() as u32 + line as u32;
         Some(2 * cell + u32::from(unseen))
     }

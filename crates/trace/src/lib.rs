@@ -40,4 +40,5 @@ pub mod scene;
 pub mod solid_stack;
 pub mod tallies;
 pub mod transmittance;
+mod wavelengths;
 pub mod work_unit;

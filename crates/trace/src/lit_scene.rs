@@ -8,6 +8,7 @@ use etendue_math::Vec3;
 use etendue_optics::light_sampler::LightSampler;
 
 use crate::scene::Scene;
+use crate::wavelengths::Wavelengths;
 
 /// The share of picks of a source that goes by flux alone; the others go by flux over the square of the distance.
 const BY_FLUX: f64 = 0.5;
@@ -31,8 +32,8 @@ pub struct LitScene<'a> {
     /// Flux of all sources.
     pub(crate) flux: f64,
     candidates: Vec<Candidate>,
-    /// Wavelengths: sum of the shares, the wavelength, and how much of each source's flux has it, over its share.
-    pub(crate) lines: Vec<(f64, f64, Vec<f64>)>,
+    /// Those of the sources.
+    pub(crate) wavelengths: Wavelengths,
     /// As of a run forwards.
     pub(crate) stop: Option<&'a AtomicBool>,
 }
@@ -48,35 +49,6 @@ impl<'a> LitScene<'a> {
     #[must_use]
     pub fn new(scene: &'a Scene, light_samplers: &'a [Option<LightSampler>]) -> Self {
         let total: f64 = scene.sources.iter().map(|s| s.flux).sum();
-        let mut wavelengths: Vec<f64> = scene
-            .sources
-            .iter()
-            .flat_map(|s| s.spectrum.iter().map(|l| l.0))
-            .collect();
-        wavelengths.sort_by(f64::total_cmp);
-        wavelengths.dedup();
-        let (mut lines, mut sum) = (Vec::new(), 0.0);
-        for wavelength in wavelengths {
-            // The share of each source's flux at this wavelength.
-            let own: Vec<f64> = scene
-                .sources
-                .iter()
-                .map(|s| {
-                    let mut below = 0.0;
-                    let mut share = 0.0;
-                    for (line, up_to) in &s.spectrum {
-                        if *line == wavelength {
-                            share += up_to - below;
-                        }
-                        below = *up_to;
-                    }
-                    share
-                })
-                .collect();
-            let share: f64 = own.iter().zip(&scene.sources).map(|(o, s)| o * s.flux / total).sum();
-            sum += share;
-            lines.push((sum, wavelength, own.into_iter().map(|o| o / share).collect()));
-        }
         let candidates = scene.sources.iter().zip(light_samplers).map(|(source, sampler)| {
             let around = source.bounds();
             let share = source.flux / total;
@@ -100,7 +72,7 @@ impl<'a> LitScene<'a> {
             light_samplers,
             flux: total,
             candidates: candidates.collect(),
-            lines,
+            wavelengths: Wavelengths::new(scene),
             stop: None,
         }
     }

@@ -4,7 +4,7 @@ use etendue_geometry::origin_faces::OriginFaces;
 use etendue_geometry::shape::ROUNDING;
 use etendue_math::Vec3;
 
-use crate::interaction::first_interaction;
+use crate::interaction::{Interaction, first_interaction};
 use crate::medium_cache::MediumCache;
 use crate::scatter::SurfaceEvent;
 use crate::scene::Scene;
@@ -15,15 +15,17 @@ const MOST_PASSED: u32 = 1000;
 
 /// The share of light that gets from a point to another without being scattered, reflected or refracted: what media do not
 /// absorb, 0 if there is a surface in between.
+///
+/// `told` is called with each stretch: the solids that it lies in, and what ends it before its end, if anything does.
 #[must_use]
 pub fn transmittance(
     scene: &Scene,
-    from: Vec3,
-    to: Vec3,
+    [from, to]: [Vec3; 2],
     origin_faces: OriginFaces,
     stack: SolidStack,
     media: &mut MediumCache,
     wavelength: f64,
+    mut told: impl FnMut(SolidStack, Option<&Interaction>),
 ) -> f64 {
     let (mut o, mut origin_faces, mut stack, mut depth) = (from, origin_faces, stack, 0.0);
     let d = (to - from).normalized();
@@ -32,7 +34,9 @@ pub fn transmittance(
         // What lies within rounding of the end is the surface that the end lies on.
         let reach = distance - 64.0 * ROUNDING * (o.x.abs() + o.y.abs() + o.z.abs() + distance);
         let absorption = media.at(scene, stack.top(), wavelength).absorption;
-        match first_interaction(scene, o, d, &origin_faces, reach, stack) {
+        let next = first_interaction(scene, o, d, &origin_faces, reach, stack);
+        told(stack, next.as_ref().ok().and_then(Option::as_ref));
+        match next {
             Err(_) => return 0.0,
             Ok(None) => {
                 depth += absorption * distance;

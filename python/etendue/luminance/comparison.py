@@ -97,7 +97,7 @@ class Comparison:
     region : Region, PolygonRegion or None
         Where they were compared; None for the whole screen.
     notes : tuple of str
-        What could not be computed, and why.
+        In what maps differ that were compared in spite of it, what could not be computed, and why.
     """
 
     ncc: float
@@ -248,7 +248,7 @@ def compare(
     require_known(dead, DEAD_RULES, "rule for dead pixels")
     for lmap in (test, reference):
         check_luminance_map(lmap, "compare")
-    _check_comparable(test, reference, ignore_geometry)
+    differing = _check_comparable(test, reference, ignore_geometry)
     if region is not None:
         check_region(region, "compare")
     used = region.mask(reference.screen) if region else np.ones(reference.screen.shape, dtype=np.bool_)
@@ -282,14 +282,16 @@ def compare(
         compared=used,
         region=region,
     )
-    return dataclasses.replace(result, notes=tuple(_what_is_undefined(result)))
+    pixelwise = f"compared pixel by pixel, although {'; '.join(differing)}"
+    return dataclasses.replace(result, notes=(*([pixelwise] if differing else []), *_what_is_undefined(result)))
 
 
 def _dead_as_zero(values: Array) -> Array:
     return np.where(np.isnan(values), 0.0, values)
 
 
-def _check_comparable(test: LuminanceMap, reference: LuminanceMap, ignore_geometry: bool) -> None:
+def _check_comparable(test: LuminanceMap, reference: LuminanceMap, ignore_geometry: bool) -> list[str]:
+    """What of observer and screen differs, which is an error unless it is to be ignored."""
     if test.unit != reference.unit:
         raise ArgumentError(
             f"compare: the test map is in {test.unit}, the reference in {reference.unit}. Convert the ray set first."
@@ -299,11 +301,12 @@ def _check_comparable(test: LuminanceMap, reference: LuminanceMap, ignore_geomet
             f"compare: the test map has {test.screen.rows} × {test.screen.columns} pixels, the reference "
             f"{reference.screen.rows} × {reference.screen.columns} (rows × columns). Make both on one screen."
         )
-    differing = [] if ignore_geometry else list(_geometric_differences(test, reference))
-    if differing:
+    differing = list(_geometric_differences(test, reference))
+    if differing and not ignore_geometry:
         raise ArgumentError(
             f"compare: {'; '.join(differing)}. Make both for one observer and screen, or use ignore_geometry=True."
         )
+    return differing
 
 
 def _geometric_differences(test: LuminanceMap, reference: LuminanceMap) -> Iterator[str]:

@@ -34,9 +34,8 @@ GAIN = 3.0
 LEAST_LINES = 1 << 19
 """Lines of sight of a map from which it is tried: of fewer, the survey alone would take longer."""
 
-MOST_COLOURS, MOST_FACES = 8, 10_000
-"""Wavelengths and faces of a scene up to which it is tried: a patch has cells for each wavelength, a face one patch or more,
-and of many cells each is met by few."""
+MOST_FACES = 10_000
+"""Faces of a scene up to which it is tried: each has one patch or more, and of many each is met by few."""
 
 MOST_SEGMENTS, SCOUTS = 100, 2000
 """Segments of a ray, the mean of so many rays, up to which it is tried: what a ray does is kept until its batch is done,

@@ -187,7 +187,7 @@ class PathTracing(Method):
         Many times as fast where light goes to and fro between diffuse surfaces. Patches that light does not reach evenly
         are not used. The map's notes tell how it compares with lines that go on, and its errors hold what that leaves open.
         If None, a pilot of a map of half a million lines or more tells whether it is better; not beside rays forwards,
-        with more than eight wavelengths or 10 000 faces, or where a ray meets more than a hundred surfaces.
+        with more than 10 000 faces, or where a ray meets more than a hundred surfaces.
 
     Raises
     ------

@@ -18,7 +18,6 @@ from etendue.luminance.caustics import Forward, LightImages, Plan, plan
 from etendue.luminance.gathering import (
     FIRST_CHECK,
     LEAST_LINES,
-    MOST_COLOURS,
     MOST_FACES,
     MOST_SEGMENTS,
     NOT_TAKEN,
@@ -202,12 +201,11 @@ class _Surveys:
 
     def __init__(self, core: _core.Scene, record: Record, seed: int, threads: int | None) -> None:
         self._made_of = core, seed, MOST_EVENTS, threads
-        colours = np.unique(np.concatenate([source["wavelengths"] for source in record["sources"]]))
-        self._few = len(colours) <= MOST_COLOURS and len(record["faces"]) <= MOST_FACES
+        self._few = len(record["faces"]) <= MOST_FACES
 
     @cached_property
     def may_pay(self) -> bool:
-        """Whether to try them unasked: of few faces and colours, and rays that come to an end."""
+        """Whether to try them unasked: of few faces, and rays that come to an end."""
         core, seed, events, threads = self._made_of
         if not self._few:
             return False

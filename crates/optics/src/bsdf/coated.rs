@@ -113,6 +113,10 @@ impl Bsdf for Coated {
         &self.facts
     }
 
+    fn is_selective(&self) -> bool {
+        self.base.depends_on_wavelength()
+    }
+
     fn shares(&self, incident: Vec3, media: &Media) -> Shares {
         let [outside, _] = media.seen_from(incident);
         let mirrored = self.mirrored(incident.z.abs(), outside);

@@ -124,6 +124,11 @@ pub trait Bsdf: Debug + Send + Sync {
         false
     }
 
+    /// Whether it may treat some wavelengths differently from others where the media on both sides do not: it is *selective*.
+    fn is_selective(&self) -> bool {
+        true
+    }
+
     /// Angles \[rad\] and wavelengths \[nm\] between which the shares are bilinear and beyond which they do not change; None if
     /// they are not of that kind.
     fn breakpoints(&self) -> Option<[Vec<f64>; 2]> {

@@ -120,6 +120,10 @@ impl Bsdf for CosinePower {
         &self.facts
     }
 
+    fn is_selective(&self) -> bool {
+        false
+    }
+
     fn shares(&self, incident: Vec3, _media: &Media) -> Shares {
         let mut diffuse = [0.0; 2];
         diffuse[usize::from(self.transmitted)] = self.albedo.at(incident)[0].min(1.0);

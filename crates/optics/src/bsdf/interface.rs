@@ -24,6 +24,10 @@ impl Bsdf for Interface {
         &FACTS
     }
 
+    fn is_selective(&self) -> bool {
+        false
+    }
+
     #[inline]
     fn shares(&self, incident: Vec3, media: &Media) -> Shares {
         let [n1, n2] = media.seen_from(incident);

@@ -44,6 +44,10 @@ impl Bsdf for Lambertian {
         &self.facts
     }
 
+    fn is_selective(&self) -> bool {
+        self.tables.iter().any(Table::depends_on_wavelength)
+    }
+
     #[inline]
     fn shares(&self, incident: Vec3, media: &Media) -> Shares {
         let cosine = incident.z.abs();

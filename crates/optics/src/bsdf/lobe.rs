@@ -300,6 +300,10 @@ impl Bsdf for Lobe {
         &self.facts
     }
 
+    fn is_selective(&self) -> bool {
+        false
+    }
+
     fn shares(&self, incident: Vec3, _media: &Media) -> Shares {
         let share = if self.renormalised {
             self.share_of_normal()

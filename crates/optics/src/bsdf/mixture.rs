@@ -173,6 +173,10 @@ impl Bsdf for Mixture {
         &self.facts
     }
 
+    fn is_selective(&self) -> bool {
+        self.members.iter().any(|(_, bsdf)| bsdf.is_selective())
+    }
+
     #[inline]
     fn shares(&self, incident: Vec3, media: &Media) -> Shares {
         if let (Some([mirrored, 0.0, back, through]), cosine) = (self.facts.constant, incident.z.abs()) {

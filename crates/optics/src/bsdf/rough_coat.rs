@@ -119,6 +119,10 @@ impl Bsdf for RoughCoat {
         &FACTS
     }
 
+    fn is_selective(&self) -> bool {
+        self.base.depends_on_wavelength()
+    }
+
     fn shares(&self, incident: Vec3, media: &Media) -> Shares {
         let ratio = self.ratio(incident, media);
         let mirrored = self.mirrored(incident, ratio);

@@ -262,6 +262,10 @@ impl Bsdf for RoughInterface {
         &FACTS
     }
 
+    fn is_selective(&self) -> bool {
+        false
+    }
+
     fn shares(&self, incident: Vec3, media: &Media) -> Shares {
         let [n1, n2] = media.seen_from(incident);
         if n1 == n2 {

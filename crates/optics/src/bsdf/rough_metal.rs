@@ -135,6 +135,10 @@ impl Bsdf for RoughMetal {
         &self.facts
     }
 
+    fn is_selective(&self) -> bool {
+        self.reflectance.depends_on_wavelength()
+    }
+
     fn shares(&self, incident: Vec3, media: &Media) -> Shares {
         let [once, mean] = self.once(incident, media.wavelength);
         let missing = 1.0 - self.perfect.at(incident)[0];

@@ -98,12 +98,12 @@ impl<'a> Search<'a> {
     /// None if there is nothing to look for.
     pub fn new(lit: &'a LitScene<'a>, view: &'a View, most_events: u32, targets: &'a [Target]) -> Option<Self> {
         let observer = place_observer(lit.scene, view.observer, view.target).ok()?;
-        let n = lit.lines.len();
-        let colours = n.min(COLOURS);
+        let wavelengths = &lit.wavelengths;
+        let colours = wavelengths.count().min(COLOURS);
         // In the middle of each of as many parts of the light.
         let wavelengths = (0..colours).map(|k| {
             let share = (k as f64 + 0.5) / colours as f64;
-            lit.lines[lit.lines.partition_point(|line| line.0 < share).min(n - 1)].1
+            wavelengths.at(wavelengths.draw(share))
         });
         let search = Self {
             lit,

@@ -60,7 +60,8 @@ impl PathBlock<'_> {
         // What light that came through smooth surfaces does from here on is left to the light image, if there is one.
         let all = !(self.method.left == LeftOut::Caustics && branch.direct);
         let known = &self.known[self.pass_of(&path).pass];
-        let light = known.at(self.lit.scene, place, branch.travelled, path.line as usize, all);
+        let line = branch.selective.then_some(path.line as usize);
+        let light = known.at(self.lit, place, branch.travelled, line, all);
         let Some(light) = light else { return Known::Nothing };
         self.paths[branch.path as usize].sum[0] += branch.weight * light * event.leaving(parts);
         parts.rest.map_or(Known::All, |rest| Known::But(&**rest))
@@ -133,8 +134,6 @@ impl PathBlock<'_> {
         all: bool,
     ) {
         let (scene, interaction) = (self.lit.scene, event.interaction());
-        let line = self.paths[branch.path as usize].line as usize;
-        let (_, _, colour) = &self.lit.lines[line];
         let (which, picked) = if all {
             (0..scene.sources.len(), 1.0)
         } else {
@@ -161,7 +160,7 @@ impl PathBlock<'_> {
             if light.f * light.cosine * beacon.irradiance <= 0.0 {
                 continue;
             }
-            let mut share = branch.weight * colour[number] * light.f * light.cosine / picked;
+            let mut share = branch.weight * light.f * light.cosine / picked;
             if beacon.density.is_finite() {
                 let mine = picked * beacon.density;
                 share *= power_weight(mine, spread.density(k, &light, light.about));
@@ -169,6 +168,8 @@ impl PathBlock<'_> {
             self.shadows.push(interaction.point, k, interaction.origin_faces);
             self.connections.push(Connection {
                 path: branch.path,
+                source: number,
+                selective: branch.selective,
                 light: [share * beacon.irradiance, share * beacon.deviation],
                 stack: light.stack,
                 to: beacon.point,
@@ -178,7 +179,7 @@ impl PathBlock<'_> {
 
     /// Looks at the connections of the block: light counts that nothing stands in the way of.
     pub(super) fn connect(&mut self, hits: &mut Hits) {
-        let scene = self.lit.scene;
+        let (scene, wavelengths) = (self.lit.scene, &self.lit.wavelengths);
         if self.connections.is_empty() {
             return;
         }
@@ -187,6 +188,7 @@ impl PathBlock<'_> {
             let (o, wavelength) = (self.shadows.origin(i), self.wavelength(connection.path));
             let distance = (connection.to - o).length();
             let absorption = self.media.at(scene, connection.stack.top(), wavelength).absorption;
+            let mut selective = connection.selective || wavelengths.are_absorbed_by(scene, connection.stack.top());
             // What lies within rounding of the end is the surface that the end lies on.
             let free = if hits.t[i] >= distance * (1.0 - TIE) {
                 if absorption == 0.0 {
@@ -198,16 +200,22 @@ impl PathBlock<'_> {
                 let origin_faces = self.shadows.origin_faces(i);
                 transmittance(
                     scene,
-                    o,
-                    connection.to,
+                    [o, connection.to],
                     origin_faces,
                     connection.stack,
                     &mut self.media,
                     wavelength,
+                    |stack, interaction| {
+                        selective |= wavelengths.are_absorbed_by(scene, stack.top())
+                            || interaction.is_some_and(|met| wavelengths.are_told_at(scene, met));
+                    },
                 )
             };
-            let sum = &mut self.paths[connection.path as usize].sum;
-            *sum = [sum[0] + free * connection.light[0], sum[1] + free * connection.light[1]];
+            let path = &mut self.paths[connection.path as usize];
+            let seen = free * wavelengths.weight(path.line as usize, connection.source, selective);
+            for (sum, light) in path.sum.iter_mut().zip(connection.light) {
+                *sum += seen * light;
+            }
         }
         self.connections.clear();
         self.shadows.clear();

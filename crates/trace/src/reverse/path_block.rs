@@ -49,6 +49,8 @@ pub(super) struct Branch {
     pub(super) density: f64,
     /// Its ways through smooth surfaces from the observer (see [`led_on`](crate::glints::led_on)).
     pub(super) ways: u32,
+    /// Whether anything on its way treats wavelengths differently.
+    pub(super) selective: bool,
     /// On one of 2^`thinned` lines of sight it is followed, for all of them.
     pub(super) thinned: u8,
     /// Sources no farther along its line were met on the way to where it starts. Of single precision, as branches are the size of
@@ -95,7 +97,7 @@ pub(super) struct PixelPass {
 
 impl PixelPass {
     /// The numbers of a path.
-    fn numbers(&self, index: u32) -> Numbers {
+    pub(super) fn numbers(&self, index: u32) -> Numbers {
         let address = self.address.wrapping_add(u64::from(index));
         Numbers::after(self.point.at(index), &self.shift, self.stream, address)
     }
@@ -128,6 +130,10 @@ pub(super) struct Path {
 /// A connection of a diffuse surface to a source, that counts if nothing is in between.
 pub(super) struct Connection {
     pub(super) path: u32,
+    /// The number of the source.
+    pub(super) source: usize,
+    /// Whether anything on the way to here treats wavelengths differently.
+    pub(super) selective: bool,
     pub(super) light: [f64; 2],
     pub(super) stack: SolidStack,
     pub(super) to: Vec3,
@@ -195,7 +201,7 @@ impl<'a> PathBlock<'a> {
     }
 
     pub(super) fn wavelength(&self, path: u32) -> f64 {
-        self.lit.lines[self.paths[path as usize].line as usize].1
+        self.lit.wavelengths.at(self.paths[path as usize].line as usize)
     }
 
     /// The random numbers of a path. Many paths need none: theirs are not worked out.

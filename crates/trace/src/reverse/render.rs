@@ -222,7 +222,7 @@ impl<'a> Renderer<'a> {
             share: 1.0,
         };
         block.passes.push(pass);
-        if !aimed && glints.is_empty() && block.lit.lines.len() == 1 {
+        if !aimed && glints.is_empty() && block.lit.wavelengths.count() == 1 {
             let begin = starts.paths.len();
             starts.paths.extend((block.paths.len() as u32..).take(indices.len()));
             block.paths.extend(indices.clone().map(|index| Path { index, ..path }));
@@ -235,7 +235,7 @@ impl<'a> Renderer<'a> {
         }
         let [evenly, about] = [false, true].map(|aimed| f64::from(paths_of(block.method, aimed)));
         let more = about / evenly;
-        let lines = &block.lit.lines;
+        let wavelengths = &block.lit.wavelengths;
         for index in indices {
             let [du, dv, third, last] = point.at(index).moved(0, &shift);
             let place = if aimed {
@@ -248,15 +248,21 @@ impl<'a> Renderer<'a> {
             } else {
                 1.0 / (1.0 + more * glints::density(glints, place))
             };
-            let number = if aimed { last } else { third };
-            let line = lines.partition_point(|l| l.0 < number).min(lines.len() - 1) as u32;
+            let mut number = if aimed { last } else { third };
+            if wavelengths.count() > 1 {
+                // Moved at random within the distance of the lines of a pass, as picks of sources are: else as many of them as in
+                // almost all passes would have the few wavelengths that get through.
+                let aside = block.passes[path.pass as usize].numbers(index).aside();
+                number = (number + aside / if aimed { about } else { evenly }).fract();
+            }
+            let line = wavelengths.draw(number) as u32;
             // What is drawn about an image may lie in another pixel.
             if !aimed || (0..2).all(|k| (corner[k]..corner[k] + 1.0).contains(&place[k])) {
                 starts.places[0].push(place[0]);
                 starts.places[1].push(place[1]);
                 starts.paths.push(block.paths.len() as u32);
             }
-            let drawn = 2 + u8::from(aimed) + u8::from(lines.len() > 1);
+            let drawn = 2 + u8::from(aimed) + u8::from(wavelengths.count() > 1);
             block.paths.push(Path {
                 index,
                 line,
@@ -287,6 +293,7 @@ impl<'a> Renderer<'a> {
                 direct: true,
                 density: 0.0,
                 ways: glints::STRAIGHT,
+                selective: false,
                 thinned: 0,
                 behind: 0.0,
             };

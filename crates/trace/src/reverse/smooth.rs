@@ -14,6 +14,7 @@ use multiversion::multiversion;
 use super::path_block::{Branch, PathBlock, Seen};
 use crate::buckets::Buckets;
 use crate::glints::led_on;
+use crate::lit_scene::LitScene;
 use crate::medium_cache::MediumCache;
 use crate::scatter::SPLIT;
 use crate::scene::Scene;
@@ -66,11 +67,20 @@ struct Sides {
     sign: f64,
     /// Absorption coefficient of the medium that it comes through \[1/mm\].
     absorption: f64,
+    /// Whether that medium or the interface treats wavelengths differently.
+    selective: bool,
 }
 
 impl Sides {
     /// None if the face is hidden there, or the line goes on as if nothing were there, or cannot.
-    fn new(scene: &Scene, solid: u16, before: SolidStack, wavelength: f64, media: &mut MediumCache) -> Option<Self> {
+    fn new(
+        lit: &LitScene<'_>,
+        solid: u16,
+        before: SolidStack,
+        wavelength: f64,
+        media: &mut MediumCache,
+    ) -> Option<Self> {
+        let (scene, wavelengths) = (lit.scene, &lit.wavelengths);
         let after = before.crossed(solid)?;
         let [here, there] = [before, after].map(|stack| media.at(scene, stack.top(), wavelength));
         let meets = solid >= before.top().min(after.top()) && here.n > 0.0 && there.n > 0.0 && here.n != there.n;
@@ -80,6 +90,9 @@ impl Sides {
             n: [here.n, there.n],
             sign: if before.contains(solid) { -1.0 } else { 1.0 },
             absorption: here.absorption,
+            selective: wavelengths.are_absorbed_by(scene, before.top())
+                || wavelengths.are_bent_by(scene, before.top())
+                || wavelengths.are_bent_by(scene, after.top()),
         })
     }
 }
@@ -195,6 +208,7 @@ impl PathBlock<'_> {
             branch.travelled += scratch.t[k];
             branch.direct &= branch.scatters > 0;
             let sides = &scratch.kinds[scratch.kind[k] as usize];
+            branch.selective |= sides.selective;
             if sides.absorption > 0.0 {
                 branch.weight *= (-sides.absorption * scratch.t[k]).exp();
             }
@@ -236,7 +250,6 @@ impl PathBlock<'_> {
     /// Finds what lies on both sides of a face of a solid for each of some branches; those for which it is no interface are
     /// worked on by themselves.
     fn look_around(&mut self, solid: u16, which: &[u32], hits: &Hits, scratch: &mut SplitScratch) {
-        let scene = self.lit.scene;
         scratch.which.clear();
         scratch.kinds.clear();
         scratch.kind.clear();
@@ -252,7 +265,7 @@ impl PathBlock<'_> {
             let kind = if let Some((.., kind)) = known {
                 *kind
             } else {
-                let kind = Sides::new(scene, solid, stack, wavelength, &mut self.media).map(|sides| {
+                let kind = Sides::new(self.lit, solid, stack, wavelength, &mut self.media).map(|sides| {
                     scratch.kinds.push(sides);
                     #[allow(clippy::cast_possible_truncation, reason = "a block is short")]
                     {

@@ -33,6 +33,7 @@ impl PathBlock<'_> {
         let mut branch = self.branches[i];
         let wavelength = self.wavelength(branch.path);
         let absorption = self.media.at(scene, branch.stack.top(), wavelength).absorption;
+        branch.selective |= self.lit.wavelengths.are_absorbed_by(scene, branch.stack.top());
         let Ok(mut interaction) = interaction_of(scene, &self.lines, hits, i, branch.stack, |_, _, _| {}) else {
             self.paths[branch.path as usize].lost += branch.weight as f32;
             return;
@@ -50,6 +51,7 @@ impl PathBlock<'_> {
         if branch.weight == 0.0 {
             return;
         }
+        branch.selective |= self.lit.wavelengths.are_told_at(scene, &interaction);
         match SurfaceEvent::new(scene, &interaction, d, wavelength, &mut self.media) {
             Err(_) => self.paths[branch.path as usize].lost += branch.weight as f32,
             Ok(Some(event)) => self.surface_event(&branch, &event),
@@ -120,9 +122,10 @@ impl PathBlock<'_> {
                 }
                 let path = &mut paths[branch.path as usize];
                 let shared = if is_small(branch, path) { path.share } else { 1.0 };
-                let (_, wavelength, colour) = &lit.lines[path.line as usize];
-                let mut weight = branch.weight * shared * colour[number];
-                let absorption = media.at(scene, branch.stack.top(), *wavelength).absorption;
+                let (line, top) = (path.line as usize, branch.stack.top());
+                let selective = branch.selective || lit.wavelengths.are_absorbed_by(scene, top);
+                let mut weight = branch.weight * shared * lit.wavelengths.weight(line, number, selective);
+                let absorption = media.at(scene, top, lit.wavelengths.at(line)).absorption;
                 if absorption > 0.0 {
                     weight *= (-absorption * hit.t).exp();
                 }

@@ -157,6 +157,10 @@ impl Bsdf for Tabulated {
         &self.facts
     }
 
+    fn is_selective(&self) -> bool {
+        self.sides.are_selective()
+    }
+
     fn shares(&self, incident: Vec3, media: &Media) -> Shares {
         let incidence = Incidence::new(incident);
         let front = incident.z > 0.0;

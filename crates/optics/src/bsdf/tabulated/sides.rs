@@ -67,6 +67,11 @@ impl Sides {
         self.sheets.iter().flatten().map(|(_, ways)| ways)
     }
 
+    /// Whether a side has tables at several wavelengths.
+    pub fn are_selective(&self) -> bool {
+        self.sheets.iter().any(|side| side.len() > 1)
+    }
+
     /// The same with others in the place of these.
     pub fn map(&self, mut other: impl FnMut(&Lobes) -> Option<Lobes>) -> Self {
         let mut sheet = |(at, ways): &(f64, [Option<Lobes>; 2])| {

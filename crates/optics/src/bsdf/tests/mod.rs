@@ -257,9 +257,10 @@ fn no_more_leaves_than_is_known_beforehand() {
 
 #[test]
 fn facts_are_true() {
-    let mut some = [false; 4];
+    let mut some = [false; 6];
     for Example { name, bsdf, .. } in kinds().iter().flatten() {
         let facts = bsdf.facts();
+        some[4 + usize::from(bsdf.is_selective())] = true;
         let mut met = [false; 4];
         let mut kept = true;
         for media in &MEDIA {
@@ -276,6 +277,18 @@ fn facts_are_true() {
                 let one = bsdf.evaluate(incident, direction(0.3, 0.1), media);
                 let other = bsdf.evaluate(incident, direction(0.9, 0.7), media);
                 assert!(!facts.lambertian || one == other, "{name}");
+                if !bsdf.is_selective() {
+                    let elsewhere = Media {
+                        wavelength: media.wavelength + 100.0,
+                        ..*media
+                    };
+                    assert_eq!(
+                        shares.in_order(),
+                        bsdf.shares(incident, &elsewhere).in_order(),
+                        "{name}"
+                    );
+                    assert_eq!(one, bsdf.evaluate(incident, direction(0.3, 0.1), &elsewhere), "{name}");
+                }
             }
         }
         // A mirror of a glass may reflect by total reflection alone.
@@ -297,7 +310,7 @@ fn facts_are_true() {
             some[k] |= fact;
         }
     }
-    assert_eq!(some, [true; 4]);
+    assert_eq!(some, [true; 6]);
 }
 
 /// The largest relative difference between f/n² there and back, and between the refracted shares there and back.
