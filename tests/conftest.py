@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,6 +17,14 @@ hypothesis.settings.load_profile("fixed")
 
 # What a test fits, it fits: only the tests of the cache name a folder.
 os.environ["ETENDUE_CACHE_DIR"] = ""
+
+# Thousands of tests make folders and remove them, milliseconds each on a disk. Where there is a file system in memory with
+# room for them (a test has some 100 MB at most), and programs may run from it, they are there.
+IN_MEMORY, ROOM = Path("/dev/shm"), 4 << 30  # noqa: S108 - each run has a folder of its own there
+if "TMPDIR" not in os.environ and os.access(IN_MEMORY, os.W_OK):
+    found = os.statvfs(IN_MEMORY)
+    if found.f_bavail * found.f_frsize >= ROOM and not found.f_flag & os.ST_NOEXEC:
+        os.environ["TMPDIR"] = tempfile.tempdir = str(IN_MEMORY)
 
 pytest_plugins = ["oracles.time_budget", "oracles.workers"]
 

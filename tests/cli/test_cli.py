@@ -608,11 +608,10 @@ def test_a_screen_that_sees_nothing_ends_well_with_a_hint(run: Run, folder: Path
     assert "about the target" in people.out
 
 
-@pytest.fixture
-def maps(tmp_path: Path, folder: Path) -> tuple[Path, Path]:
+@pytest.fixture(scope="module")
+def maps(tmp_path_factory: pytest.TempPathFactory, folder: Path) -> tuple[Path, Path]:
     """Two noisy maps of the same view, outside the folder that the program works in."""
-    place = tmp_path.parent / f"{tmp_path.name}-maps"
-    place.mkdir()
+    place = tmp_path_factory.mktemp("maps")
     for name, file in (("a", "led.tm25ray"), ("b", "led.dat")):
         et.luminance_map(et.read_rays(folder / file), *api_view(), method="cone", acceptance=3.0).save(
             place / f"{name}.npz"

@@ -6,6 +6,7 @@ import os
 import stat
 import threading
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from etendue.errors import ArgumentError, OutputError
@@ -111,6 +112,16 @@ def test_device_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ArgumentError, match=r"device or a pipe"), atomic_output(pipe):
         pytest.fail("the block must not run")
     assert stat.S_ISFIFO(pipe.stat().st_mode)
+
+
+@pytest.mark.skipif(not os.access("/dev/shm", os.W_OK), reason="only Linux has /dev/shm")  # noqa: S108 - it is what is tested
+def test_files_in_memory_are_ordinary_ones() -> None:
+    with TemporaryDirectory(dir="/dev/shm") as folder:
+        with atomic_output(Path(folder) / "map.csv") as temporary:
+            temporary.write_text("whole")
+        assert (Path(folder) / "map.csv").read_text() == "whole"
+    with pytest.raises(ArgumentError, match=r"device or a pipe"), atomic_output(Path("/dev/map.csv")):
+        pytest.fail("the block must not run")
 
 
 def test_two_writers_at_once_do_not_mix(tmp_path: Path) -> None:

@@ -157,7 +157,9 @@ def require_writable(path: Path) -> None:
 
 
 def _destination(path: Path) -> Path:
-    if (path.exists() and (not path.is_dir() and not path.is_file())) or path.absolute().parts[:2] == ("/", "dev"):
+    # Files in memory are ordinary ones.
+    among_devices = path.absolute().parts[:2] == ("/", "dev") and path.absolute().parts[2:3] != ("shm",)
+    if (path.exists() and (not path.is_dir() and not path.is_file())) or among_devices:
         # Taking the place of /dev/null or of a pipe would destroy it for everyone.
         raise ArgumentError(f"{path}: cannot write: this is a device or a pipe. Give the path of an ordinary file.")
     # A link is followed, so that the file it points to is replaced and the link itself survives.
