@@ -242,6 +242,7 @@ def dim() -> et.NearFieldRun:
     return gonio.measure(die_in_a_glow, size=36, samples=16)
 
 
+@pytest.mark.slow
 def test_one_exposure_loses_the_glow_and_sets_the_wrong_scale(dim: et.NearFieldRun) -> None:
     """The photometer sees all light, the camera the die alone: its luminance is too high by (die + glow)/die.
 
@@ -256,6 +257,7 @@ def test_one_exposure_loses_the_glow_and_sets_the_wrong_scale(dim: et.NearFieldR
     assert lmap.values[radius > 2].mean() < 1e-2 * FAINT
 
 
+@pytest.mark.slow
 def test_exposures_as_advised_bring_it_back(dim: et.NearFieldRun) -> None:
     """The glow's luminance by z, the die's to 1 %; the glow's share of the flux to 0.1 %."""
     lmap = dim.luminance_map(0)

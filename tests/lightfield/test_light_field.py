@@ -44,6 +44,7 @@ def excess(source: object, field: LightField, luminance: np.ndarray | None = Non
     return float(np.mean(np.log(truth) - np.log((1 - 1e-4) * found + 1e-4 * 1e6 / (np.pi * field.surface.area))))
 
 
+@pytest.mark.slow
 def test_flux_is_that_of_the_rays_that_were_met(film: tuple[PrismaticFilm, et.RaySet, LightField]) -> None:
     _, rays, field = film
     assert field.total_flux == pytest.approx(rays.total_flux - field.report.unmet_flux, rel=1e-12)

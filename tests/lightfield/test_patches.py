@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import functools
 import json
 import sys
 from collections.abc import Callable
@@ -24,6 +25,7 @@ Array = npt.NDArray[np.float64]
 Run = Callable[..., tuple[int, str, str]]
 
 
+@functools.cache
 def dome_rays(n: int = 20_000, unit: str = "lm") -> et.RaySet:
     source = DieUnderDome(floor=0.1)
     position, direction = source.rays(n, seed=7)

@@ -337,6 +337,7 @@ def test_a_real_file_gets_the_surface_an_engineer_would_choose(samples: Path, na
         assert getattr(found, field.name) == (value if isinstance(value, str) else pytest.approx(value, abs=0.01))
 
 
+@pytest.mark.slow
 def test_notes_name_all_that_was_compared(led_choice: SurfaceChoice) -> None:
     choice = led_choice
     assert choice.surface.told in choice.notes[0]

@@ -34,9 +34,13 @@ BATCH = 1 << 16
 """Proposals of a rejection step: few enough for their arrays to stay in the cache."""
 
 
+_rule = functools.cache(np.polynomial.legendre.leggauss)
+"""Found once: one total flux asks for hundreds, of two sizes."""
+
+
 def _gauss(nodes: int, low: float, high: float) -> tuple[Array, Array]:
     """Gauss-Legendre nodes and weights between `low` and `high`."""
-    x, w = np.polynomial.legendre.leggauss(nodes)
+    x, w = _rule(nodes)
     return low + (high - low) * (x + 1) / 2, (high - low) * w / 2
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import functools
 import http.client
 import json
 import threading
@@ -69,9 +70,14 @@ def serving(exhibit: Exhibit) -> Iterator[Visitor]:
         thread.join()
 
 
+@functools.cache
+def lamp() -> Exhibit:
+    return exhibit_of(FIELDS["lamp"], name="lamp.h5")
+
+
 @pytest.fixture
 def visitor() -> Iterator[Visitor]:
-    yield from serving(exhibit_of(FIELDS["lamp"], name="lamp.h5"))
+    yield from serving(lamp())
 
 
 def test_the_token_is_good_once_and_the_cookie_afterwards(visitor: Visitor) -> None:
@@ -184,7 +190,7 @@ def scene() -> et.Scene:
 def test_a_scene_is_refined_by_lines_of_sight_until_another_view_comes(scene: et.Scene) -> None:
     """The last pass is the map that `luminance_map` makes of the scene; a new view gives up the old one."""
     field = FIELDS["lamp"]
-    exhibit = Exhibit(exhibit_of(field, name="lens").subject, field, scene)
+    exhibit = Exhibit(lamp().subject, field, scene)
     asked = {
         "observer": {"theta": 10.0, "phi": 0.0, "distance": 100.0, "target": [0, 0, 2]},
         "screen": {"width": 5.0, "height": 4.0, "columns": 40, "rows": 32},

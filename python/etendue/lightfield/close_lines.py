@@ -142,10 +142,16 @@ def _distances(origin: FloatArray, along: FloatArray, origins: FloatArray, direc
     origins, directions : array, shape (others, 3)
         Of the others, q and m.
     """
-    triple = along @ np.cross(directions, origins).T + np.cross(along, origin) @ directions.T
-    square = 1.0 - (along @ directions.T) ** 2
-    apart: FloatArray = np.abs(triple) / np.sqrt(np.maximum(square, LEAST_SINE**2))
-    parallel = np.nonzero(square <= LEAST_SINE**2)
+    # In place: tables of millions of pairs, for which new memory takes longer than what is worked out.
+    apart: FloatArray = along @ np.cross(directions, origins).T
+    apart += np.cross(along, origin) @ directions.T
+    sine = along @ directions.T
+    sine *= sine
+    np.subtract(1.0, sine, out=sine)
+    parallel = np.nonzero(sine <= LEAST_SINE**2)
+    np.sqrt(np.maximum(sine, LEAST_SINE**2, out=sine), out=sine)
+    np.abs(apart, out=apart)
+    apart /= sine
     between = origins[parallel[1]] - origin[parallel[0]]
     apart[parallel] = np.linalg.norm(np.cross(between, along[parallel[0]]), axis=1)
     return apart
