@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import etendue as et
@@ -35,18 +36,22 @@ def clipped(*, scans: et.Scans) -> et.Scans:
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["automatic", "specular-centred", "shepard"])
 def test_shares_of_noise_are_those_of_the_level(method: str) -> None:
-    """Within 4 standard errors over 24 seeds; with values below 0 taken for 0 they are about twice as large."""
+    """Within 4 standard errors over 24 seeds; with values below 0 taken for 0 they are about twice as large, as is told: for
+    four seeds that is worked out."""
     kept, lifted = [], []
     for seed in range(24):
         scans = dark(seed=seed)
         data = tabulated(scans, method)
         (one,) = data.slices
         kept.append(one.integral())
-        lifted.append(tabulated(clipped(scans=scans), method).slices[0].integral())
         count = int((scans.values < 0.0).sum())
         (told,) = (each.found for each in data.complaints if "below 0" in each.found)
         assert told.startswith(f"{count} of {scans.values.size} below 0, down to {scans.values.min():.3g}")
-        assert told.endswith(f"it is {kept[-1]:.4g}, and would be {lifted[-1]:.4g} if they were 0")
+        own, without = re.search(r"it is (\S+), and would be (\S+) if they were 0$", told).groups()  # type: ignore[union-attr]
+        assert own == f"{kept[-1]:.4g}"
+        if seed < 4:
+            assert without == f"{tabulated(clipped(scans=scans), method).slices[0].integral():.4g}"
+        lifted.append(float(without))
     error = float(np.std(kept, ddof=1)) / math.sqrt(len(kept))
     assert error < 0.12 * TRUE
     assert abs(np.mean(kept) - TRUE) < 4.0 * error
