@@ -248,6 +248,23 @@ def test_no_lobe_of_light_that_does_not_arrive(run: Run, angle: str) -> None:
     assert not Path("film.png").exists()
 
 
+def test_files_for_other_verbs_are_answered(run: Run, scans: list[Path]) -> None:
+    """Scans that were not made a BSDF yet, and a format that is read only."""
+    assert (
+        "this is a goniometer scan, no BSDF. etendue bsdf fit makes a BSDF of it" in run("bsdf", "info", scans[0]).err
+    )
+    assert "this is a goniometer scan, no ray file" in run("info", scans[0]).err
+    et.write_bsdf("film.h5", et.bsdf.Gaussian(peak=2, sigma=0.1))
+    read_only = run("bsdf", "convert", "film.h5", "film.binary").err
+    assert "MERL table is read only; formats that are written: astm, bird, etendue" in read_only
+    assert "merl" not in read_only
+    assert not Path("film.binary").exists()
+
+
+def test_the_family_of_verbs_installs_nothing(run: Run) -> None:
+    assert "completion" not in run("bsdf", "--help").out
+
+
 def test_mistakes_are_told_and_nothing_is_written(run: Run, scans: list[Path]) -> None:
     wrong = run("bsdf", "fit", *scans, "-o", "pet.h5", "--method", "smoth")
     assert wrong.status == 2

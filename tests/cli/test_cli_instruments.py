@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -33,6 +34,20 @@ def test_a_diffuser_is_measured_and_comes_back(run: Run) -> None:
     assert "# stop = penalised" in Path("true.csv").read_text()
     plain = run("deconvolve", "scan.csv", "--instrument", "signature.csv", "--stop", "12", "--operator", "slice")
     assert "stop after 12 iterations" in plain.out
+
+
+def test_a_scan_is_deconvolved_to_every_kind_of_picture_that_help_names(run: Run) -> None:
+    """``.svg`` was in the help, and refused."""
+    lines = {wide: "".join(f"{k / 5},{math.exp(-k * k / wide)}\n" for k in range(-40, 41)) for wide in (100, 40)}
+    for wide, name in ((100, "scan.csv"), (40, "bare.csv")):
+        Path(name).write_text("angle,flux\n" + lines[wide])
+    done = run("deconvolve", "scan.csv", "--instrument", "bare.csv", "--stop", "3", "-o", "true.svg", "-o", "true.pdf")
+    assert done.status == 0, done.err
+    assert b"<svg" in Path("true.svg").read_bytes()
+    for wrong in ("3.5", "-3", "plato"):
+        told = run("deconvolve", "scan.csv", "--instrument", "bare.csv", "--stop", wrong)
+        assert told.status == 2
+        assert "thesis. Or a whole number of iterations, from 1." in told.err
 
 
 def test_mistakes_are_told_and_nothing_is_written(run: Run) -> None:

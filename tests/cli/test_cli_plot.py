@@ -87,6 +87,16 @@ def test_an_intensity_distribution_is_drawn_as_one(run: Run, tmp_path: Path) -> 
     assert "--vmax" in refused.err
 
 
+def test_complaints_keep_their_severity_and_name_one_of_several_files(run: Run) -> None:
+    """Planes of 100 and 200 cd meet at γ = 0: a warning, of the one file that has it."""
+    et.write_intensity("sure.ies", et.Intensity([0.0, 90.0], [0.0, 90.0], [[100.0, 1.0], [100.0, 2.0]]))
+    et.write_intensity("torn.ies", et.Intensity([0.0, 90.0], [0.0, 90.0], [[100.0, 1.0], [200.0, 2.0]]))
+    alone = run("plot", "torn.ies", "-o", "lamp.svg").err
+    assert alone.startswith("warning: ")
+    assert "torn.ies" not in alone
+    assert run("plot", "sure.ies", "torn.ies", "-o", "{name}.svg").err.startswith("warning: torn.ies: ")
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [

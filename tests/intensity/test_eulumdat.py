@@ -177,7 +177,10 @@ def test_sizes(read) -> None:
         (ldt(1, [0], [0, 90], [100, 50], lines={26: ""}), "line is empty"),
         (ldt(1, [0], [0, 90], [100, 50], lines={29: 0}), "kilolumen"),
         (ldt(1, [0], [0, 90], [100, 50], lines={29: ""}), "kilolumen"),
-        (ldt(1, [0], [0, 90], [100, 50], lines={3: 5}), "no intensity distribution"),
+        (
+            ldt(1, [0], [0, 90], [100, 50], lines={3: 5}),
+            "line 3, symmetry: found 5; it must be a whole number from 0 to 4",
+        ),
         (ldt(1, [0], [0, 90], [100, 50])[:20], "the file ends"),
     ],
 )

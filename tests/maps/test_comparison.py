@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -217,7 +218,10 @@ def test_maps_of_another_geometry_are_refused(change: dict[str, Any], words: str
     other = reference.replace(**change)
     with pytest.raises(ArgumentError, match=words):
         compare(other, reference)
-    assert compare(other, reference, ignore_geometry=True).nrmse == 0.0
+    ignored = compare(other, reference, ignore_geometry=True)
+    assert ignored.nrmse == 0.0
+    assert any("pixel by pixel, although" in note and re.search(words, note) for note in ignored.notes)
+    assert not any("although" in note for note in compare(reference, reference, ignore_geometry=True).notes)
 
 
 def test_every_difference_is_named_at_once() -> None:

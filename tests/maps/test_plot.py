@@ -355,6 +355,16 @@ def test_comparisons_of_every_map(which: str, scale: Any) -> None:
     assert_nothing_is_cut_off(plot_comparison(compare(lmap.replace(values=1.1 * lmap.values), lmap), scale=scale))
 
 
+def test_comparison_of_two_observers_names_both() -> None:
+    """It named the reference's alone, as if both maps had been seen from there."""
+    reference = make_map([[1.0, 2.0]])
+    test = reference.replace(observer=Observer(10, 20, 300))
+    text = words(plot_comparison(compare(test, reference, ignore_geometry=True)))
+    one, other = (style.describe_observer(lmap.observer) for lmap in (test, reference))
+    assert f"first seen at {one}; second at {other}" in text
+    assert f"seen at {other}" in words(plot_comparison(compare(reference, reference)))
+
+
 def test_comparison_shows_both_maps_alike_and_where_they_differ(tmp_path: Path) -> None:
     reference = make_map([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
     test = reference.replace(values=reference.values * [[1, 2, 1], [1, 1, 3]])

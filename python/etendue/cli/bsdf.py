@@ -15,8 +15,9 @@ from etendue.cli.stated import Verb, refuse, stated
 from etendue.cli.terminal import check_folder, complain, one_of, print_json, say
 from etendue.errors import ArgumentError
 from etendue.formats.bsdf import BSDF_FORMATS
+from etendue.formats.own_kind import DIRECTIONS, STAGES
 from etendue.formats.rt300s import is_rt300s
-from etendue.formats.scans_csv import DIRECTIONS, STAGES, read_columns
+from etendue.formats.scans_csv import read_columns
 from etendue.plot import plot_bsdf
 from etendue.quantities.bsdf_slice import BsdfSlice
 from etendue.quantities.measured import measured
@@ -30,7 +31,11 @@ from etendue.scatter.scans.interpolations import AUTOMATIC, METHODS, share_error
 from etendue.scatter.scans.scans import Scans
 from etendue.scatter.table import BsdfTable
 
-app = typer.Typer(help="Files of scatter data: what they hold, pictures of it, other formats.", no_args_is_help=True)
+app = typer.Typer(
+    help="Files of scatter data: what they hold, pictures of it, other formats.",
+    no_args_is_help=True,
+    add_completion=False,
+)
 
 ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0)
 """Angles of incidence at which shares are told [°]."""
@@ -334,7 +339,8 @@ def _fit_table(scans: Scans, named: str, method: str, output: Path, *, json: boo
         total = scans.transmittance if held.transmitted else scans.reflectance
         scaled = "" if total is None else f", scaled to {total:g}"
         say(f"  {place}: the scans{way} add up to {_share_told(held)}{scaled}")
-    say(f"{output}: {len(table.data.slices)} slices of {scans.values.size} values, {method}")
+    count = len(table.data.slices)
+    say(f"{output}: {count} slice{'s' * (count != 1)} of {scans.values.size} values, {method}")
 
 
 def _share_told(one: BsdfSlice) -> str:

@@ -12,6 +12,7 @@ import typer
 from etendue.cli.stated import refuse
 from etendue.cli.terminal import check_outputs, complain, half_width, one_of, print_json, say
 from etendue.errors import ArgumentError
+from etendue.formats.maps import PICTURE_EXTENSIONS
 from etendue.instruments.bench import Bench
 from etendue.instruments.deconvolution import REPLICATES, Deconvolution, Method
 from etendue.instruments.deconvolution import deconvolve as deconvolve_scan
@@ -101,10 +102,10 @@ def deconvolve(
         method = one_of(method, METHODS, "--method")
     rule: str | int | None = stop
     if stop is not None:
-        rule = int(stop) if stop.isdecimal() else one_of(stop, RULES, "--stop")
+        rule = int(stop) if stop.isdecimal() else _rule(stop)
     chosen = None if models is None else [one_of(name.strip(), LOBE_MODELS, "--models") for name in models.split(",")]
     outputs = output or []
-    check_outputs(outputs, (".csv", ".png", ".pdf"))
+    check_outputs(outputs, (".csv", *PICTURE_EXTENSIONS))
     measured = read_scan(scan)
     bare = None if instrument is None else read_goniometer_scan(instrument)
     if isinstance(measured, GoniometerScan):
@@ -140,6 +141,20 @@ def deconvolve(
         **more,
     )
     _tell_directions(found, scan, outputs, json=json)
+
+
+def _rule(stop: str) -> str:
+    """The rule by which the iteration ends, of ``--stop``.
+
+    Raises
+    ------
+    typer.BadParameter
+        If it is neither a rule nor a number of iterations.
+    """
+    try:
+        return one_of(stop, RULES, "--stop")
+    except typer.BadParameter as mistake:
+        raise typer.BadParameter(f"{mistake.message} Or a whole number of iterations, from 1.") from None
 
 
 def _refuse(given: dict[str, object]) -> None:

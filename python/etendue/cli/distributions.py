@@ -52,11 +52,23 @@ def _plain(name: str, fact: Any) -> Any:
     return fact if _stated(name, fact) else None
 
 
+def _told(value: Any) -> str:
+    """A fact as people read it.
+
+    >>> _told(True), _told(0.1), _told("T5")
+    ('yes', '0.1', 'T5')
+    """
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.7g}" if isinstance(value, float) else str(value)
+
+
 def print_intensity(distribution: Intensity) -> None:
     """A distribution in figures, for people."""
     facts = describe_intensity(distribution)
     low, high = facts["gamma_range"]
-    say(f"{facts['quantity']}, {facts['planes']} planes, {facts['gammas']} angles γ from {low:g}° to {high:g}°")
+    planes = "one plane" if facts["planes"] == 1 else f"{facts['planes']} planes"
+    say(f"{facts['quantity']}, {planes}, {facts['gammas']} angles γ from {low:g}° to {high:g}°")
     flux = measured(distribution.flux, distribution.flux_error, distribution.flux_unit)
     say(f"  flux {flux}, symmetry {facts['symmetry']}")
     say(f"  {peak_line(distribution)}")
@@ -68,7 +80,7 @@ def print_intensity(distribution: Intensity) -> None:
                 f"  spectrum: {value.wavelength[0]:g} to {value.wavelength[-1]:g} nm, {value.wavelength.size} wavelengths"
             )
         elif name not in {"keywords", "lamp_sets", "tilt"}:
-            text = f"{value:.7g}" if isinstance(value, float) else str(value)
+            text = _told(value)
             unit = re.search(r"\[(\w+)\]", LUMINAIRE_FACTS[name].replace("[flux unit]", f"[{distribution.flux_unit}]"))
             told = f"{text[:100]}{f' {unit[1]}' if unit else ''}" if _stated(name, value) else "not stated"
             say(f"  {name.replace('_', ' ')}: {told}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from pathlib import Path
 from typing import Annotated, get_args
@@ -87,7 +88,8 @@ def plot(
         else:
             say(f"{file}")
             for complaint in one.complaints:
-                complain(f"note: {complaint}")
+                where = complaint.place if len(files) == 1 else f"{file.name}: {complaint.place}"
+                complain(str(dataclasses.replace(complaint, place=where)))
         for path in paths:
             say(f"  {path}")
 

@@ -74,7 +74,7 @@ def summary(place: str) -> str:
     assert isinstance(spec.loader, SourceFileLoader)  # noqa: S101
     text = spec.loader.get_source(module) or ""
     of_function = rf'^def {name}\(.*?\) -> None:\n    """(.*?)"""'
-    of_family = rf'^{name} = typer\.Typer\(help="(.*?)"'
+    of_family = rf'^{name} = typer\.Typer\(\s*help="(.*?)"'
     found = re.search(of_function, text, re.DOTALL | re.MULTILINE) or re.search(of_family, text, re.MULTILINE)
     assert found is not None, f"{place} does not say what it does"  # noqa: S101 - a test asks every verb
     return inspect.cleandoc(found[1])

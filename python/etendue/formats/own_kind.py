@@ -33,6 +33,21 @@ LIGHT_FIELD, TRACE_RESULT, NEAR_FIELD = "etendue light field", "etendue trace re
 MAP_TITLE, ILLUMINANCE_TITLE = "# etendue luminance map", "# etendue illuminance map"
 """First lines of maps as CSV."""
 
+DIRECTIONS = ("theta_i", "phi_i", "theta_s", "phi_s", "bsdf")
+POSITIONS = ("angle", "flux")
+POLAR = ("theta_s", "phi_s", "flux")
+STAGES = ("alpha", "beta", "gamma", "delta", "flux")
+STANDARD_ERROR = "standard_error"
+"""Columns of goniometer scans as CSV, and the one that may stand beside them."""
+
+SCANS = (
+    (DIRECTIONS, "etendue bsdf fit makes a BSDF of it, and deconvolve takes the instrument out of it."),
+    (STAGES, "etendue bsdf fit makes a BSDF of it."),
+    (POLAR, "etendue deconvolve takes the instrument out of it."),
+    (POSITIONS, "etendue deconvolve takes the instrument out of it."),
+)
+"""Columns, and what takes a scan that has them."""
+
 MAP = Kind("a luminance or illuminance map", "etendue plot, filter, compare and view take it.")
 WORKBOOK = Kind(
     "a workbook of Excel", "etendue bsdf fit takes scans of the goniometer RT-300S; export other tables as text."
@@ -63,6 +78,8 @@ def own_kind(head: Head) -> Kind | None:
     'a scene'
     >>> own_kind(Head(Path("paint.toml"), 19, b'kind = "lambertian"')).title
     'a finish'
+    >>> own_kind(Head(Path("scan.csv"), 11, b"Angle; flux")).title
+    'a goniometer scan'
     """
     data = head.data
     if data.startswith(SIGNATURE):
@@ -73,8 +90,15 @@ def own_kind(head: Head) -> Kind | None:
     if (data.startswith(b"PK\x03\x04") and b"header.npy" in data[:128]) or data.startswith(titles):
         return MAP
     if head.path.suffix.lower() != ".toml":
-        return None
+        return _scan(head)
     return FINISH if KIND_OF_FINISH.search(FIRST_TABLE.split(data, 1)[0]) else SCENE
+
+
+def _scan(head: Head) -> Kind | None:
+    """A scan is known by the names of its columns, in the first line that is no remark."""
+    first = next((line for line in head.lines if line.strip() and not line.lstrip().startswith("#")), "")
+    names = {name.strip().casefold() for name in re.split("[;\t,]", first)} - {STANDARD_ERROR}
+    return next((Kind("a goniometer scan", advice) for layout, advice in SCANS if names == set(layout)), None)
 
 
 def _of_hdf5(path: Path) -> Kind | None:

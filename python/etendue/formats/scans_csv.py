@@ -13,15 +13,12 @@ import numpy.typing as npt
 from etendue.errors import FormatError
 from etendue.formats.encodings import decoded
 from etendue.formats.input import as_path
+from etendue.formats.own_kind import STANDARD_ERROR
 from etendue.formats.rays.text_rows import number
 
 Array = npt.NDArray[np.float64]
 
-DIRECTIONS = ("theta_i", "phi_i", "theta_s", "phi_s", "bsdf")
-POSITIONS = ("angle", "flux")
-POLAR = ("theta_s", "phi_s", "flux")
-STAGES = ("alpha", "beta", "gamma", "delta", "flux")
-ERROR = "standard_error"
+ERROR = STANDARD_ERROR
 LARGEST = 1 << 28
 DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 

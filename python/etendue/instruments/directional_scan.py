@@ -15,7 +15,8 @@ from etendue.errors import ArgumentError, EtendueError, FormatError
 from etendue.extras import scipy_part
 from etendue.formats.input import as_path
 from etendue.formats.output import atomic_output
-from etendue.formats.scans_csv import DIRECTIONS, ERROR, POLAR, read_columns, read_remarks
+from etendue.formats.own_kind import DIRECTIONS, POLAR
+from etendue.formats.scans_csv import ERROR, read_columns, read_remarks
 from etendue.instruments.bench import Bench
 from etendue.instruments.goniometer_scan import GoniometerScan, Way, flux_of_unit_bsdf, known_of, read_goniometer_scan
 from etendue.instruments.lobe_table import polar_slice

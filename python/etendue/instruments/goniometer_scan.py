@@ -16,7 +16,8 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.input import as_path
 from etendue.formats.output import atomic_output
-from etendue.formats.scans_csv import DIRECTIONS, ERROR, POSITIONS, read_columns, read_remarks
+from etendue.formats.own_kind import DIRECTIONS, POSITIONS
+from etendue.formats.scans_csv import ERROR, read_columns, read_remarks
 from etendue.instruments.positions import Plane, detector_directions
 from etendue.instruments.ring_sum import sum_of_rings
 from etendue.quantities.arguments import as_numbers, require_known, require_numbers

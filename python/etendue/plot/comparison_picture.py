@@ -168,7 +168,10 @@ def plot_comparison(
     heading = title if title is not None else _heading(comparison)
     left, top = layout.panels[0][0], layout.height
     style.add_text(figure, left, top - 0.32, heading, size=style.TITLE_SIZE, color=style.INK, weight="bold")
-    seen = f"seen at {style.describe_observer(reference.observer)}"
+    observers = [style.describe_observer(lmap.observer) for lmap in (comparison.test, reference)]
+    seen = f"seen at {observers[1]}"
+    if observers[0] != observers[1]:
+        seen = f"first seen at {observers[0]}; second at {observers[1]}"
     style.add_text(figure, left, top - 0.54, seen, size=style.LABEL_SIZE, color=style.FAINT)
     for number, line in enumerate(reversed(lines)):
         style.add_text(figure, left, 0.14 + 0.16 * number, line, size=style.TICK_SIZE, color=style.FAINT)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from etendue.description.files import Files
 from etendue.errors import ArgumentError
-from etendue.formats.bsdf import bsdf_format, read_bsdf_data, write_bsdf_data, write_bsdf_shares
+from etendue.formats.bsdf import BSDF_FORMATS, bsdf_format, read_bsdf_data, write_bsdf_data, write_bsdf_shares
 from etendue.formats.bsdf.bsdf_format import NO_ERRORS, BsdfFormat
 from etendue.quantities.arguments import BSDF, require, require_path
 from etendue.quantities.bsdf_data import BsdfData
@@ -237,7 +237,8 @@ def write_bsdf(path: str | os.PathLike[str], bsdf: Bsdf, format: str | None = No
 
 def _laid_out(bsdf: Bsdf, form: BsdfFormat) -> tuple[BsdfData, tuple[str, ...]]:
     if form.fits is None or form.tabulate is None:
-        raise ArgumentError(f"{form.title} is read only")
+        written = ", ".join(one.name for one in BSDF_FORMATS.values() if one.tabulate is not None)
+        raise ArgumentError(f"{form.title} is read only; formats that are written: {written}.")
     for data in _as_it_is(bsdf):
         if form.fits(data):
             return data, ()

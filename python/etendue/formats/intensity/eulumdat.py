@@ -36,12 +36,17 @@ FLUX_TOLERANCE = 0.05
 """Relative disagreement between the integral and the light output ratio that becomes a warning; coarse tables of narrow
 beams are off by up to 4.5 %."""
 
+DIGITS = range(10)
+
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:\s[0-9]{3})+(?![^\s.,])")
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
 
 
 def recognise(head: Head) -> bool:
-    """Lines 2 to 7 are a type, a symmetry, and two counts of angles with their steps; line 1 is not that of an IES file."""
+    """Lines 2 to 7 are a type, a symmetry, and two counts of angles with their steps; line 1 is not that of an IES file.
+
+    Type and symmetry may be any digit: the reader says which it does not know, and where.
+    """
     if head.lines and head.lines[0].lstrip().upper().startswith("TILT"):
         return False
     words = [_first_word(line) for line in head.lines[1:7]]
@@ -50,7 +55,7 @@ def recognise(head: Head) -> bool:
         return False
     kind, symmetry, planes, step, gammas, gamma_step = numbers
     counts = planes >= 1 and planes.is_integer() and gammas >= 2 and gammas.is_integer()
-    return kind in range(4) and symmetry in ISYM and counts and 0 <= step <= 360 and 0 <= gamma_step <= 180
+    return kind in DIGITS and symmetry in DIGITS and counts and 0 <= step <= 360 and 0 <= gamma_step <= 180
 
 
 def read(path: Path) -> Intensity:

@@ -165,5 +165,15 @@ def _point(point: list[float] | None, unit: str) -> str | None:
 
 
 def _short(value: Any) -> str:
-    text = f"{value:.7g}" if isinstance(value, float) else str(value)
+    """A fact of a header as people read it.
+
+    >>> _short(False), _short((0.0, -2.5, 1e-3)), _short(1.0), _short("led")
+    ('no', '(0, -2.5, 0.001)', '1', 'led')
+    """
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, tuple) and all(isinstance(one, float) for one in value):
+        text = f"({', '.join(f'{one:.7g}' for one in value)})"
+    else:
+        text = f"{value:.7g}" if isinstance(value, float) else str(value)
     return text if len(text) <= 100 else text[:97] + "..."

@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, FormatError
+from etendue.formats.own_kind import DIRECTIONS, STAGES
 from etendue.formats.rt300s import is_rt300s, read_rt300s
-from etendue.formats.scans_csv import DIRECTIONS, ERROR, STAGES, read_columns, read_remarks
+from etendue.formats.scans_csv import ERROR, read_columns, read_remarks
 from etendue.quantities.arguments import described, require, require_number, require_path
 from etendue.quantities.bsdf_directions import direction
 from etendue.scatter.scans.goniometer import bsdf_of_flux, detector_direction, incident_direction

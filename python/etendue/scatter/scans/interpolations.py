@@ -276,7 +276,8 @@ def suited(scans: Scans) -> tuple[str, str]:
         counts.append(len(azimuths))
         most = max(most, r.size)
     if scattered:
-        why = f"the values lie at {max(counts)} azimuths about the specular direction, and make no scans through it"
+        most_azimuths = f"{max(counts)} azimuths" if max(counts) > 1 else "one azimuth"
+        why = f"the values lie at {most_azimuths} about the specular direction, and make no scans through it"
         return "natural-neighbours", why
     if min(counts) < 2:
         return (
