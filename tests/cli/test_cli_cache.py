@@ -35,6 +35,8 @@ def test_a_report_has_the_field_that_maps_have(run: Run, tmp_path: Path, monkeyp
     surface = ("--surface", "disk:radius=40")  # to choose one takes seconds
     look = ("luminance", "led.tm25ray", "--observer", "0,0", "--size", "70,70", "--pixels", "4,4", *surface)
     assert run(*look, "-o", "map.npz").status == 0
+    # The pages that are drawn, for a second each, are tried elsewhere.
+    monkeypatch.setattr("etendue.cli.report.plot_report", lambda *_: None)
     fits = []
     fit = et.LightField.fit
     monkeypatch.setattr(et.LightField, "fit", staticmethod(lambda *a, **k: fits.append(1) or fit(*a, **k)))

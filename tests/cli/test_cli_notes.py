@@ -422,6 +422,8 @@ def test_what_python_knows_is_printed(
     # There are no notes in the solid of intensity on a page.
     solid = {"c": [0, 180], "gamma": [0, 90, 180], "values": [1, 0, 0, 1, 0, 0], "unit": "cd"}
     monkeypatch.setattr("etendue.viewer.subjects.intensity_solid", lambda _: solid)
+    # Nor is it asked what the page of a report shows, which takes a second to draw.
+    monkeypatch.setattr("etendue.cli.report.plot_report", lambda *_: None)
     call = CASES[verb]
     assert call is not None
     with warnings.catch_warnings():
