@@ -231,6 +231,20 @@ def test_zonal_flux_errs_as_stated() -> None:
     assert (stats.chi2.sf(scatter, 40) > SIGNIFICANCE).all()
 
 
+def test_no_error_is_stated_of_zones_that_no_ray_reached() -> None:
+    """Behind a lobe of cos³⁰ it is dark, as far as its rays tell; beyond a table it is dark for certain."""
+    lobe = {"kind": "surface", "shape": {"kind": "disk", "radius": 1}, "exponent": 30, "flux": 100}
+    for steps in ({}, {"c_planes": 4, "gamma_step": 5}):
+        far = et.trace(et.Scene(sources=[lobe], detectors=[{"kind": "intensity", **steps}]), 2000).intensity.only
+        flux, error = zonal_flux(far, np.arange(0.0, 181.0, 10.0))
+        assert (error[:3] > 0.0).all()
+        assert (flux[10:] == 0.0).all()
+        assert np.isnan(error[10:]).all()
+        assert (np.isnan(error) <= (flux == 0.0)).all()
+    flux, error = zonal_flux(et.Intensity([0], [0, 45, 90], [[4.0, 1, 0]], 0.5), [0, 90, 180])
+    assert error[0] > 0.0 == error[1] == flux[1]
+
+
 def test_the_flux_code_of_a_lambertian_emitter() -> None:
     """Shares sin² γ of the cones of π/2, π and 3π/2 sr: 43.75, 75 and 93.75 % [CIE0521982]."""
     gamma = np.arange(0.0, 90.05, 0.1)

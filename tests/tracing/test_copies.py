@@ -55,10 +55,16 @@ def cells_of(rays: et.RaySet) -> npt.NDArray[np.int64]:
 
 
 def sum_and_error(rays: et.RaySet, flux: float) -> tuple[Array, Array]:
-    """Illuminance of each cell by the n rays of a set, and the standard error of a sample of n."""
-    w, cell, n = rays.flux * flux / rays.flux.sum(), cells_of(rays), len(rays)
-    total, squares = (np.bincount(cell[cell >= 0], v[cell >= 0], 20) for v in (w, w * w))
-    error = np.sqrt(n / (n - 1) * (squares - total**2 / n))
+    """Illuminance of each cell by the n rays of a set, and the standard error of a sample of n of this total flux.
+
+    Σ w² − 2p Σ w v + p² Σ v² with p = Σ w/Σ v of the rays' flux v, of which w is what gets to the cell; of Σ w v it is taken
+    that it is the lesser one of Σ w² and p Σ v².
+    """
+    v, cell, n = rays.flux * flux / rays.flux.sum(), cells_of(rays), len(rays)
+    total, squares = (np.bincount(cell[cell >= 0], u[cell >= 0], 20) for u in (v, v * v))
+    share, square = total / flux, (v * v).sum()
+    both = np.minimum(squares, share * square)
+    error = np.sqrt(n / (n - 1) * (squares - 2 * share * both + share**2 * square))
     error[total == 0] = np.nan
     return total.reshape(4, 5) / CELL, error.reshape(4, 5) / CELL
 
@@ -66,7 +72,7 @@ def sum_and_error(rays: et.RaySet, flux: float) -> tuple[Array, Array]:
 @pytest.mark.parametrize(("n", "rays"), [(2000, 200_000), (3, 1_300_000), (517, 70_001)])
 def test_errors_are_those_of_the_distinct_rays(n: int, rays: int) -> None:
     """2000 rays traced as 200 000 are 2000 rays; so are 3 whose copies span many batches and two rounds. Where nothing
-    is drawn by chance, sum and error are those of the set: Σ w and √(n/(n − 1) (Σ w² − (Σ w)²/n))."""
+    is drawn by chance, sum and error are those of the set."""
     lamp = lopsided(n, 7)
     result = et.trace(et.Scene(sources=[{"name": "led", "kind": "rays", "rays": lamp}], detectors=[GRID]), rays)
     seen = result.illuminance["grid"]

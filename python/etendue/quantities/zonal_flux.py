@@ -33,7 +33,8 @@ def zonal_flux(intensity: Intensity, edges: npt.ArrayLike) -> tuple[Array, Array
     (array, array), each of shape (n,)
         Flux of each zone and its standard error [`flux_unit`]: the exact integral of the bilinear function. Errors of
         nodes add as those of a far field made of rays do, neighbours having a correlation of ¼; where nodes err together
-        (`Intensity.smooth`) they add as they are, an upper bound. NaN where no error is known.
+        (`Intensity.smooth`) they add as they are, an upper bound. NaN where no error is known, as of zones that no ray
+        reached.
 
     Raises
     ------
@@ -63,8 +64,11 @@ def zonal_flux(intensity: Intensity, edges: npt.ArrayLike) -> tuple[Array, Array
     errors = known_errors(intensity)
     if np.isnan(errors).all():
         return flux, np.full(flux.size, np.nan)
+    # Of nodes that no ray reached, no error is known; of what lies beyond the table, nothing is missing.
+    dark = np.isnan(intensity.standard_error).all(axis=0) & ~intensity.values.any(axis=0)
+    unknown = (weights[:, dark] > 0.0).any(axis=1) & ~(weights[:, ~dark] > 0.0).any(axis=1)
     if intensity.smooth:
-        return flux, np.asarray(weights @ (planes @ errors))
+        return flux, np.where(unknown, np.nan, weights @ (planes @ errors))
     kinks = kinks_around(intensity.c, intensity.values)
     around = np.array([_around(intensity.c, *row) for row in zip(kinks.T, errors.T, strict=True)])
     # Between two rows of nodes the function is linear in γ: its weight is that of the two.
@@ -75,7 +79,8 @@ def zonal_flux(intensity: Intensity, edges: npt.ArrayLike) -> tuple[Array, Array
     np.add.at(spread.T, row, ((1.0 - up) * weights).T)
     np.add.at(spread.T, row + 1, (up * weights).T)
     spread *= around[rows]
-    return flux, np.sqrt((spread**2).sum(axis=1) + 2.0 * NEIGHBOURS * (spread[:, 1:] * spread[:, :-1]).sum(axis=1))
+    error = np.sqrt((spread**2).sum(axis=1) + 2.0 * NEIGHBOURS * (spread[:, 1:] * spread[:, :-1]).sum(axis=1))
+    return flux, np.where(unknown, np.nan, error)
 
 
 def _zone_weights(gamma: Array, low: float, high: float) -> Array:

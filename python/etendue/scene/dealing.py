@@ -24,6 +24,9 @@ Units = tuple[npt.NDArray[np.uint32], Counts, Array]
 Tally = tuple[tuple[Array, Array, Counts], Units]
 """Of a work unit: Σ w, Σ w² and number of the rays without copies, shape (cells,), and what those with copies add."""
 
+ROUNDED = 12.0 * 2.0**-53
+"""Sums of n terms are off by up to n/2⁵³ of themselves [Higham2002]_, and variances are made of up to twelve such."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Dealing:
@@ -146,21 +149,82 @@ class Dealing:
             count[stratum, cell] += grown[2]
         return (sum_, squares, count), begun
 
-    def variance(self, cells: CellSums, rays: int) -> Array:
+    def variance(self, cells: CellSums, rays: int, sources: CellSums | None = None) -> Array:
         """Variance of Σ w of each cell over the first `rays` rays, shape (cells,).
 
         A unit adds w to a cell, mostly 0. The n units of a stratum are independent of each other and alike, so that the
         variance of their sum is n times that of w: n/(n − 1) (Σ w² − (Σ w)²/n). NaN where light is that of one ray of a set:
         what another one would have done is unknown.
+
+        Of units of unequal flux v, another sample would have another Σ v; but the flux of a set is stated. With p = Σ w/Σ v,
+        what differs is Σ (w − p v), of the variance Σ w² − 2p Σ w v + p² Σ v² (that of a ratio, [Cochran1977]_), as far as a
+        set was given out.
+
+        Parameters
+        ----------
+        cells : CellSums
+            Σ w, Σ w² and number of units of each cell.
+        rays : int
+            Given out.
+        sources : CellSums, optional
+            Σ v, Σ v² and number of units of the sources and of all of them, for cells which a unit brings its flux, as often
+            as it comes: w is 0, v, 2v … Then Σ w v is at most Σ w², and p Σ v² if flux and way have nothing to do with each
+            other. The lesser one is taken, so that the variance is at least what it should be. None: for cells of any other
+            kind, and of rays of equal flux the same.
         """
         sum_, squares, count = cells
         units = self.done(rays).astype(np.float64)[:, None]
-        variance = np.maximum(squares - sum_ * sum_ / np.maximum(units, 1.0), 0.0)
+        variance = _cleared(squares - sum_ * sum_ / np.maximum(units, 1.0), squares, units)
+        if sources is not None:
+            emitted, square = (row[:, -1:] for row in sources[:2])
+            share = np.divide(sum_, emitted, out=np.zeros_like(sum_), where=emitted > 0.0)
+            both = np.minimum(np.minimum(squares, share * square), np.sqrt(squares * square))
+            restated = _cleared(squares - 2.0 * share * both + share * share * square, squares, units)
+            stated = self._stated(sources)[:, None]
+            variance = stated * restated + (1.0 - stated) * variance
         # Rays of their own are many; of a set of few rays the last factor matters.
         factor = np.divide(units, units - 1.0, out=np.full_like(units, np.nan), where=units > 1.0)
         factor[0] = 1.0
         total: Array = np.where(count > 0, variance * factor, 0.0).sum(axis=0)
         return total
+
+    def emitted_variance(self, sources: CellSums) -> Array:
+        """Variance of what each source has emitted, and of what all of them have, shape (strata, sources + 1).
+
+        What a source emits is stated. But the flux of m of the n rays of a set differs by chance from m/n of it, by the
+        variance (1 − m/n) (Σ v² − (Σ v)²/m) of a sample that is drawn without putting back [Cochran1977]_.
+
+        Parameters
+        ----------
+        sources : CellSums
+            Σ v, Σ v² and number of units of the sources and of all of them, shape (strata, sources + 1).
+
+        Examples
+        --------
+        Two of four rays that bring 1 and 3:
+
+        >>> sums = np.array([[4.0, 4.0]]), np.array([[10.0, 10.0]]), np.array([[2, 2]], np.uint64)
+        >>> Dealing((8.0,), ((0, 4),), 4).emitted_variance(sums).tolist()
+        [[1.0, 1.0]]
+        """
+        _, squares, count = sources
+        given = count.astype(np.float64)
+        length = np.array([held[1] if held is not None else 0 for held in self.sets], dtype=np.float64)
+        left = np.zeros_like(squares)
+        left[:, :-1] = np.maximum(1.0 - given[:, :-1] / np.maximum(length, 1.0), 0.0)
+        left[:, :-1][:, length == 0.0] = 0.0
+        for stratum, members in self.copied():
+            left[stratum, -1] = max(1.0 - given[stratum, -1] / length[members[0]], 0.0)
+        variance = left * _spread(sources)
+        # Sources without copies are independent of each other.
+        variance[0, -1] = variance[0, :-1].sum()
+        return variance
+
+    def _stated(self, sources: CellSums) -> Array:
+        """For each stratum the share of the variance of its flux which a total that is stated leaves none of, 0 to 1."""
+        spread, left = _spread(sources)[:, -1], self.emitted_variance(sources)[:, -1]
+        share = np.divide(left, spread, out=np.zeros_like(left), where=spread > 0.0)
+        return np.asarray(1.0 - share.clip(0.0, 1.0))
 
     def copied(self) -> Iterator[tuple[int, list[int]]]:
         """Each stratum of copies, with the numbers of its sources."""
@@ -172,3 +236,15 @@ class Dealing:
         """Largest number of copies of a ray, on average over its set; 1 if there are none."""
         units, counts = self.core.done(self.rays), self.given
         return max([1.0, *(sum(counts[i] for i in sources) / units[j] for j, sources in self.copied() if units[j])])
+
+
+def _cleared(variance: Array, squares: Array, units: Array) -> Array:
+    """Variances of sums over so many units, 0 where they could be nothing but rounding."""
+    return np.asarray(np.where(variance > ROUNDED * units * squares, variance, 0.0))
+
+
+def _spread(sources: CellSums) -> Array:
+    """Σ v² − (Σ v)²/m of what sources emitted in m units."""
+    sum_, squares, count = sources
+    units = np.maximum(count.astype(np.float64), 1.0)
+    return _cleared(squares - sum_ * sum_ / units, squares, units)

@@ -17,6 +17,7 @@ from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.ray_set import RaySet
 from etendue.scene import Scene
+from etendue.scene.detectors.detector import Counted
 from etendue.scene.sources.from_files import Field, Rays
 from etendue.scene.sources.gridded import Gridded
 from etendue.tracing.result import TraceResult
@@ -226,9 +227,10 @@ def _subjects(noun: Noun) -> str:
 def share_error(flux: float, result: TraceResult) -> float:
     """Standard error of a flux that each ray carries whole or not at all.
 
-    That of a share of independent rays: √(p (1 − p)/n), n the number of equal rays that are as good as those of the sources
-    (`TraceResult.effective_rays`). Rays are dealt to sources, and over sources, more evenly than by chance; so the error is
-    at most this. NaN of more flux than there is: then rays were counted several times; and of none: no ray tells how little.
+    That of a share of independent rays, √(p (1 − p)/n), n the number of equal rays that are as good as those of the sources
+    (`TraceResult.effective_rays`), and that of what was emitted, if it is by some rays of a set only. Rays are dealt to
+    sources, and over sources, more evenly than by chance; so the error is at most this. NaN of more flux than there is: then
+    rays were counted several times; and of none: no ray tells how little.
 
     Examples
     --------
@@ -237,13 +239,32 @@ def share_error(flux: float, result: TraceResult) -> float:
     >>> round(share_error(25.0, result), 6)               # 50 lm · √(0.5 · 0.5/10 000)
     0.25
     """
+    share, error = _share(flux, result)
+    return math.hypot(result.ledger.total.flux * error, share * emitted_error(result))
+
+
+def _share(flux: float, result: TraceResult) -> tuple[float, float]:
+    """A flux over that of all rays, and the standard error of this share."""
     total = result.ledger.total.flux
-    if not flux > 0.0 or not result.effective_rays > 0.0:
-        return math.nan
-    if flux > total * (1.0 + ROUNDING):
-        return math.nan
+    if not flux > 0.0 or not result.effective_rays > 0.0 or flux > total * (1.0 + ROUNDING):
+        return math.nan, math.nan
     share = min(flux / total, 1.0)
-    return total * math.sqrt(share * (1.0 - share) / result.effective_rays)
+    return share, math.sqrt(share * (1.0 - share) / result.effective_rays)
+
+
+def emitted_error(result: TraceResult, source: int = -1) -> float:
+    """Standard error of the flux of a source, by its number, or of all sources [flux unit].
+
+    0 but where a set gave out some of its rays only, and these have unequal flux.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> emitted_error(et.trace(et.Scene(sources=[{"kind": "point", "flux": 50}]), rays=1000))
+    0.0
+    """
+    variance = result.plan.dealing.emitted_variance(result.sums.sources)[:, source].sum()
+    return math.sqrt(float(variance)) * result.scale
 
 
 def _flux(flux: float, result: TraceResult) -> Found:
@@ -255,8 +276,9 @@ def _emitted(step: Step, of: str) -> Found:
     ledger = step.traced.ledger
     if of and of not in ledger.emitted:
         raise UnknownNameError("source", of, ledger.emitted)
-    # What sources emit is stated, and dealt to rays exactly.
-    return Found(ledger.emitted[of].flux if of else ledger.total.flux, 0.0, ledger.flux_unit)
+    number = list(ledger.emitted).index(of) if of else -1
+    flux = ledger.emitted[of].flux if of else ledger.total.flux
+    return Found(flux, emitted_error(step.traced, number), ledger.flux_unit)
 
 
 @_noun("escaped", "flux that left the scene", "ledger")
@@ -268,9 +290,8 @@ def _escaped(step: Step, of: str) -> Found:
 @_noun("efficiency", "flux that left the scene over that emitted", "ledger")
 def _efficiency(step: Step, of: str) -> Found:
     _whole("efficiency", of)
-    total = step.traced.ledger.total.flux
-    flux, error, _ = _escaped(step, "")
-    return Found(flux / total if total > 0.0 else math.nan, error / total if total > 0.0 else math.nan, "")
+    total, flux = step.traced.ledger.total.flux, step.traced.ledger.escaped.flux
+    return Found(flux / total if total > 0.0 else math.nan, _share(flux, step.traced)[1], "")
 
 
 @_noun("absorbed", "flux that was absorbed, by everything or by the solid, surface, face or medium named", "ledger")
@@ -329,7 +350,7 @@ def _flux_of(step: Step, of: str) -> Found:
     if isinstance(found, Intensity):
         return Found(found.flux, found.flux_error, found.flux_unit)
     if isinstance(found, IlluminanceMap):
-        return Found(found.flux, _cells_error(found, result, None), found.flux_unit)
+        return Found(found.flux, _cells_error(found, step, of, None), found.flux_unit)
     if isinstance(found, RaySet):
         return _flux(found.total_flux, result)
     raise ArgumentError(f"flux:{of}: name a detector of rays, illuminance or intensity.")
@@ -343,21 +364,20 @@ def _peak(step: Step, of: str) -> Found:
     return Found(found.peak_intensity, found.peak_error, found.unit)
 
 
-def _cells_error(found: IlluminanceMap, result: TraceResult, inside: npt.NDArray[np.bool_] | None) -> float:
-    """Standard error of the flux [flux unit] on some cells, if a ray meets one of them, once, or none.
+def _cells_error(found: IlluminanceMap, step: Step, of: str, inside: npt.NDArray[np.bool_] | None) -> float:
+    """Standard error of the flux [flux unit] on some cells of a detector, if a ray meets one of them, once, or none.
 
-    The sums of squares of the cells are then those of all of them together: Σ w² − (Σ w)²/n of a cell is its variance. NaN
-    if more flux meets the cells than there is, so that rays did so several times.
+    They are one cell then, of the sums of all of them. NaN if more flux meets the cells than there is, so that rays did so
+    several times; and of none.
     """
-    area = found.screen.pixel_area / MM2_PER_M2
-    counted = np.ones(found.values.shape, dtype=np.bool_) if inside is None else inside
-    if counted.sum() > 1 and found.flux > result.ledger.total.flux * (1.0 + ROUNDING):
+    result = step.traced
+    chosen = slice(None) if inside is None else inside.ravel()
+    number = [detection.name for detection in result.plan.detections].index(of)
+    sum_, squares, count = (row[:, chosen] for row in result.sums.cells[number])
+    if sum_.shape[1] > 1 and found.flux > result.ledger.total.flux * (1.0 + ROUNDING):
         return math.nan
-    flux, error = found.values[counted] * area, np.nan_to_num(found.standard_error[counted]) * area
-    if not flux.any() or not result.effective_rays > 0.0:
-        return math.nan
-    together = (float((flux**2).sum()) - float(flux.sum()) ** 2) / result.effective_rays
-    return math.sqrt(max(float((error**2).sum()) + together, 0.0))
+    one = sum_.sum(axis=1, keepdims=True), squares.sum(axis=1, keepdims=True), count.sum(axis=1, keepdims=True)
+    return float(Counted.of(one, result.plan.dealing, result.rays_done, result.sums.sources).error[0])
 
 
 # --- maps --------------------------------------------------------------------------------------------------------------
@@ -369,7 +389,7 @@ def _mean(step: Step, of: str) -> Found:
     value = float(np.nan_to_num(found.values[inside]).mean())
     if isinstance(found, IlluminanceMap):
         area = found.screen.pixel_area / MM2_PER_M2 * int(inside.sum())
-        return Found(value, _cells_error(found, step.traced, inside) / area, found.unit)
+        return Found(value, _cells_error(found, step, of, inside) / area, found.unit)
     values, errors = (array[inside] / int(inside.sum()) for array in (found.values, found.standard_error))
     return Found(value, _sum_error(step, found, values, errors), found.unit)
 

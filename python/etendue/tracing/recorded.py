@@ -47,7 +47,8 @@ class DetectorSums:
     @cached_property
     def counted(self) -> Counted:
         """The cells."""
-        return Counted.of(self.sums.cells[self.number], self.dealing, self.sums.rays)
+        sums, detection = self.sums, self.plan.detections[self.number]
+        return detection.counted(sums.cells[self.number], sums.sources, self.dealing, sums.rays)
 
     @property
     def rays(self) -> npt.NDArray[Any]:

@@ -16,7 +16,7 @@ from etendue.quantities.notebook import InNotebook
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
 from etendue.scene.dealing import Array, Counts
-from etendue.scene.detectors.detector import Counted, Detection, Origin
+from etendue.scene.detectors.detector import Detection, Origin
 from etendue.scene.detectors.illuminance import GridIlluminance
 from etendue.scene.detectors.image import DiffuseLuminance
 from etendue.scene.detectors.intensity import FarFieldIntensity
@@ -231,8 +231,8 @@ class TraceResult(InNotebook):
         NaN if a detector saw nothing yet, or the scene has none with cells.
         """
         pairs = zip(self.plan.detections, self.sums.cells, strict=True)
-        counted = [(d, Counted.of(cells, self.plan.dealing, self.rays_done)) for d, cells in pairs if d.cells]
-        errors = [detection.relative_error(cells) for detection, cells in counted]
+        dealing, sources, rays = self.plan.dealing, self.sums.sources, self.rays_done
+        errors = [d.relative_error(d.counted(cells, sources, dealing, rays)) for d, cells in pairs if d.cells]
         return max(errors) if errors and all(error == error for error in errors) else float("nan")  # noqa: PLR0124
 
     def notes_of(self, detector: str) -> tuple[str, ...]:

@@ -61,10 +61,10 @@ class Counted:
     rays: npt.NDArray[np.int64]
 
     @classmethod
-    def of(cls, cells: CellSums, dealing: Dealing, rays: int) -> Counted:
+    def of(cls, cells: CellSums, dealing: Dealing, rays: int, sources: CellSums | None = None) -> Counted:
         """Of sums over the first `rays` rays of a run, scaled to all of them; errors as of `Dealing.variance`."""
         scale, count = dealing.rays / rays, cells[2].sum(axis=0)
-        error = np.where(count > 0, np.sqrt(dealing.variance(cells, rays)) * scale, np.nan)
+        error = np.where(count > 0, np.sqrt(dealing.variance(cells, rays, sources)) * scale, np.nan)
         return cls(cells[0].sum(axis=0) * scale, error, count.astype(np.int64))
 
     @property
@@ -142,6 +142,10 @@ class Detection(abc.ABC, Generic[Q]):
     def most_events(self) -> int:
         """Number of scatter events that are kept at most."""
         return 0
+
+    def counted(self, cells: CellSums, sources: CellSums, dealing: Dealing, rays: int) -> Counted:  # noqa: ARG002
+        """Its cells, from sums over the first `rays` rays of a run; `sources` are those of what sources emitted."""
+        return Counted.of(cells, dealing, rays)
 
     def relative_error(self, counted: Counted) -> float:
         """Median over the flux of the relative standard errors of its cells; NaN if no ray reached any."""
