@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.lightfield.storage import as_stored
 from etendue.luminance.source_report import SourceReport
-from etendue.plot.report_page import PAGE_TYPES, report_html
+from etendue.plot.report_page import A4, MARGIN, PAGE_TYPES, report_html
 from etendue.quantities.measured import measured
 
 OBSERVERS = [et.Observer(10, 20, 800, target=(3, -2, 1)), et.Observer(50, 200, 800, target=(3, -2, 1))]
@@ -137,6 +138,34 @@ def test_fluxes_of_zones_have_their_errors(report: SourceReport) -> None:
         for value, its_error in (found[2:], figures.split(" ± ")):
             assert float(its_error) == pytest.approx(error, rel=0.06)
             assert float(value) == pytest.approx(flux, abs=0.06 * error)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("flux", [3e-4, 0.9, 2e4, 6e7])
+def test_fluxes_of_zones_stand_side_by_side(report: SourceReport, flux: float) -> None:
+    """Of a source that shines all around, whatever its flux: no text on another, none beyond the margins or on the end."""
+    gamma = np.arange(0.0, 181.0, 5.0)
+    values = flux / 10.0 * (1.0 + 0.9 * np.cos(np.radians(2.0 * gamma)))
+    around = et.Intensity([0.0], gamma, [values], 0.03 * values[None])
+    figure = et.plot_report(dataclasses.replace(report, intensity=around))
+    figure.canvas.draw()
+    texts = [text for text in figure.texts if text.get_text()]
+    (first,) = [number for number, text in enumerate(texts) if text.get_text().startswith("Flux by zones of γ")]
+    end = next(number for number, text in enumerate(texts) if text.get_text().startswith("source: "))
+    zones = texts[first:end]
+    angles = [text.get_text() for text in zones if "–" in text.get_text()]
+    hidden = sum(int(text.get_text().split()[1]) for text in zones if text.get_text().startswith("and "))
+    assert len(angles) + hidden == 18
+    boxes = [text.get_window_extent() for text in zones]
+    assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
+    assert max(box.x1 for box in boxes) < figure.bbox.width * (1.0 - MARGIN / A4[0] + 0.005)
+    assert min(box.y0 for box in boxes) > texts[end].get_window_extent().y1
+    # Heading and numbers together give the flux.
+    power = (
+        zones[0].get_text().partition("[10")[2].partition(" ")[0].translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))
+    )
+    value = float(zones[2].get_text().split(" ± ")[0]) * 10.0 ** int(power or "0")
+    assert value == pytest.approx(et.zonal_flux(around, [0.0, 10.0])[0][0], rel=0.01)
 
 
 @pytest.mark.slow

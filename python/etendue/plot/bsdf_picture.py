@@ -35,6 +35,9 @@ INCIDENCES = (0.0, 30.0, 60.0, 75.0)
 DECADES = 4.0
 """That logarithmic axes show below the largest value."""
 
+NEAREST = 2e-3
+"""From the specular direction to the next point of the curves [°]; further points lie further apart."""
+
 RINGS, SPOKES = 100, 120
 """Of the polar surface: steps from the specular direction to the horizon, and around it."""
 
@@ -162,7 +165,10 @@ def _ways(bsdf: Bsdf) -> list[tuple[bool, str]]:
 
 def _in_plane(axes: Axes, bsdf: Bsdf, *, behind: bool) -> None:
     style.dress(axes)
-    angles = np.linspace(-89.9, 89.9, 1441)
+    # Narrow lobes are about the specular direction, and about the light where they are sent back.
+    beside = np.concatenate([[0.0], np.geomspace(NEAREST, 2.0, 25)])
+    lobes = np.add.outer([*INCIDENCES], np.concatenate([-beside, beside])).ravel()
+    angles = np.unique(np.concatenate([np.linspace(-89.9, 89.9, 1441), lobes, -lobes]))
     highest = 0.0
     for theta, colour in zip(INCIDENCES, style.LINES, strict=False):
         incident = direction(max(theta, 1e-6), 180.0, behind=behind)
@@ -176,7 +182,7 @@ def _in_plane(axes: Axes, bsdf: Bsdf, *, behind: bool) -> None:
         axes.set_yscale("log")
         axes.set_ylim(highest * 10.0**-DECADES, highest * 2.0)
         style.put_log_numbers(axes.yaxis)
-        style.put_legend(axes, loc="upper left")
+        style.put_legend(axes, loc="best")
     axes.set(xlim=(-90, 90), xticks=range(-90, 91, 30), xlabel="angle of scattered light [°]", ylabel="f [1/sr]")
     style.put_title(axes, "In the plane of incidence")
 

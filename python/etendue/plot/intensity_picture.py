@@ -282,14 +282,28 @@ def _polar(axes: Axes, curves: list[_Curve], names: tuple[str, str], reach: floa
                 [0, rim * np.sin(edge)], [0, -rim * np.cos(edge)],
                 color=colour, linewidth=0.7, linestyle=(0, (1, 2)), zorder=2,
             )  # fmt: skip
-    # The half planes lie where the readers of data sheets look for them.
+    _name_sides(axes, curves, rim)
+
+
+def _name_sides(axes: Axes, curves: list[_Curve], rim: float) -> None:
+    """The half planes, where the readers of data sheets look for them; in small diagrams beside the numbers at the rim."""
     sides = [curve.label.split(" (")[0].split(" – ") for curve in curves if " – " in curve.label]
+    if not sides:
+        return
+    wide, high = style.inches_of(axes)
+    inches = min(wide / float(np.ptp(axes.get_xlim())), high / float(np.ptp(axes.get_ylim()))) * rim
+    # The number at 0° is beside them, and in small diagrams also that at 30°.
+    inner = style.width_of("30°") / 2 + style.LETTER
+    if inches * (1.1 - 1.06 * math.cos(math.radians(30.0))) < 1.6 * style.TICK_SIZE / 72.0:
+        inner += 1.06 * math.sin(math.radians(30.0)) * inches
     for side, which in ((-1, 1), (1, 0)):
-        if sides:
-            axes.text(
-                side * 1.14 * rim, -1.1 * rim, ", ".join(side_names[which] for side_names in sides),
-                size=style.TICK_SIZE, color=style.FAINT, ha="left" if side < 0 else "right", va="bottom",
-            )  # fmt: skip
+        text = ", ".join(side_names[which] for side_names in sides)
+        fits = inner + style.width_of(text) <= 1.14 * inches
+        place, outward = (1.14 * rim, False) if fits else (inner / inches * rim, True)
+        axes.text(
+            side * place, -1.1 * rim, text, size=style.TICK_SIZE, color=style.FAINT, va="bottom",
+            ha="left" if (side < 0) != outward else "right",
+        )  # fmt: skip
 
 
 def _labelled(circles: Array, unit: str, inches: float) -> int:

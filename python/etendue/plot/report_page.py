@@ -52,6 +52,15 @@ MOST_ROWS = 6
 LEAST = 1e-4
 """Share of the flux above which a zone is worth a line."""
 
+END = 0.62
+"""Height of the page's last line but the signature [inches]."""
+
+SMALL = style.CAPTION_SIZE - 1.0
+"""Size of the type of the zones."""
+
+GAP = 0.06
+"""Between the angles of a zone and its flux [inches]; between two columns it is more."""
+
 LOW = 0.9
 """Height of the polar diagram where there is little room [inches]."""
 
@@ -225,29 +234,68 @@ def _draw_intensity(figure: Figure, report: SourceReport, y: float) -> None:
     x = A4[0] / 2 + 0.2
     words = [line for text in report.sheet.lines() for line in style.wrapped([text], half - 0.2)]
     y = _lines(figure, x, _heading(figure, x, y - 0.22, "As a data sheet has it"), words) - 0.5 * LINE
-    y = _heading(figure, x, y, f"Flux by zones of γ [{report.intensity.flux_unit}]")
+    _write_zones(figure, report, (x, y))
+
+
+def _write_zones(figure: Figure, report: SourceReport, place: tuple[float, float]) -> None:
+    """The flux of zones that have light, in up to three columns, as their numbers and the room above the end allow."""
     # Of the rest a page of HTML tells.
-    least = LEAST * report.intensity.flux
-    zones = [
-        (f"{low:g}–{high:g}°", measured(flux, error, "").rstrip())
-        for low, high, flux, error in report.sheet.zones
-        if flux > least
+    lit = [zone for zone in report.sheet.zones if zone[2] > LEAST * report.intensity.flux]
+    most = max((flux for _, _, flux, _ in lit), default=1.0)
+    # Numbers from 1 to 1 000 are short.
+    power = 0 if 1.0 <= most < 1e5 else 3 * math.floor(math.log10(most) / 3.0)
+    unit = style.in_powers(report.intensity.flux_unit, power)
+    x, y = place[0], _heading(figure, *place, f"Flux by zones of γ [{unit}]")
+    told = [
+        (f"{low:g}–{high:g}°", measured(flux / 10.0**power, error / 10.0**power, "").rstrip())
+        for low, high, flux, error in lit
     ]
-    for number, (where, flux_text) in enumerate(zones):
-        column, row = divmod(number, math.ceil(len(zones) / 3))
-        place = x + 1.21 * column
-        style.add_text(figure, place, y - row * LINE, where, size=style.CAPTION_SIZE - 1, color=style.FAINT)
-        style.add_text(figure, place + 0.46, y - row * LINE, flux_text, size=style.CAPTION_SIZE - 1, color=style.INK)
+    columns = _columns(told, A4[0] - MARGIN - x)
+    rows = max(1, 1 + int((y - END - LINE * (1 + len(_end_lines(report)))) / LINE))
+    hidden = sum(max(0, len(column) - rows) for column in columns)
+    # The last line is for what says so.
+    rows -= hidden > 0
+    hidden = sum(max(0, len(column) - rows) for column in columns)
+    for column in columns:
+        for row, (where, flux_text) in enumerate(column[:rows]):
+            style.add_text(figure, x, y - row * LINE, where, size=SMALL, color=style.FAINT)
+            style.add_text(figure, x + _widest(column, 0) + GAP, y - row * LINE, flux_text, size=SMALL, color=style.INK)
+        x += _widest(column, 0) + _widest(column, 1) + 2.5 * GAP
+    if hidden:
+        _lines(figure, place[0], y - rows * LINE, [f"and {hidden} more: see the page of HTML"], style.FAINT)
+
+
+def _columns(told: list[tuple[str, str]], wide: float) -> list[list[tuple[str, str]]]:
+    """Pairs of texts in three columns, or in fewer where these have no room side by side [inches].
+
+    >>> [len(column) for column in _columns([("0–10°", "1.40 ± 0.38")] * 18, 3.4)]
+    [6, 6, 6]
+    >>> [len(column) for column in _columns([("0–10°", "0.001400 ± 0.000038")] * 5, 3.4)]
+    [3, 2]
+    """
+    for count in (3, 2, 1):
+        high = max(1, math.ceil(len(told) / count))
+        columns = [told[first : first + high] for first in range(0, len(told), high)]
+        if sum(_widest(column, 0) + _widest(column, 1) + 2.5 * GAP for column in columns) <= wide + 1.5 * GAP:
+            break
+    return columns
+
+
+def _widest(column: list[tuple[str, str]], part: int) -> float:
+    return max(style.width_of(pair[part], SMALL) for pair in column)
 
 
 def _write_end(figure: Figure, report: SourceReport) -> None:
     """Where everything comes from, and room for a name."""
-    wide = A4[0] - 2 * MARGIN
-    lines = style.wrapped([f"{label}: {text}" for label, text in report.provenance], wide)[:5]
-    _lines(figure, MARGIN, 0.62 + LINE * len(lines), lines, style.FAINT)
+    wide, lines = A4[0] - 2 * MARGIN, _end_lines(report)
+    _lines(figure, MARGIN, END + LINE * len(lines), lines, style.FAINT)
     for number, what in enumerate(SIGNED):
         x = MARGIN + number * wide / len(SIGNED)
         style.add_text(figure, x, 0.38, f"{what} {'.' * 44}", size=style.CAPTION_SIZE, color=style.FAINT)
+
+
+def _end_lines(report: SourceReport) -> list[str]:
+    return style.wrapped([f"{label}: {text}" for label, text in report.provenance], A4[0] - 2 * MARGIN)[:5]
 
 
 # --- as a page of the web ----------------------------------------------------------------------------------------------
