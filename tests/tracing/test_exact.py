@@ -15,6 +15,7 @@ from etendue.tracing.result import TraceResult
 from numpy.polynomial.legendre import leggauss
 from oracles.intensity import hat_means
 from oracles.verdicts import LARGEST_Z, SIGNIFICANCE, assert_agree, assert_drawn_with
+from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 Array = npt.NDArray[np.float64]
@@ -93,6 +94,25 @@ def test_light_from_behind_is_not_counted() -> None:
     assert (seen["up"].values == 0).all()
     assert np.isnan(seen["up"].standard_error).all()
     assert (seen["down"].values > 0).all()
+
+
+def test_light_that_starts_on_a_detector_is_not_counted_wherever_it_stands() -> None:
+    """All of it is a micrometre above, whatever the rounding of a turned plane: of rays in a plane, and of a lamp there."""
+    n, rng = 5000, np.random.default_rng(3)
+    foot = np.pad(rng.uniform(-9, 9, (n, 2)), ((0, 0), (0, 1)))
+    up = rng.normal(size=(n, 3))
+    up[:, 2] = np.abs(up[:, 2])
+    plane = {"kind": "rays", "shape": {"kind": "rectangle", "width": 20, "height": 20}}
+    sheet = {"kind": "surface", "shape": {"kind": "rectangle", "width": 18, "height": 18}, "flux": 1.0}
+    for rotation, at in (([0, 0, 0], [0, 0, 1 / 3]), ([30, 40, 50], [3, 4, 5]), ([11, -73, 5], [100, 2000, 3.3])):
+        turn = Rotation.from_euler("xyz", rotation, degrees=True).as_matrix()
+        above = (turn @ [0, 0, 1e-3] + at).tolist()
+        rays = et.RaySet(foot @ turn.T + at, up @ turn.T, np.full(n, 1 / n))
+        places = {"on": at, "above": above}
+        detectors = [{**plane, "name": name, "at": place, "rotation": rotation} for name, place in places.items()]
+        for light in ({"kind": "rays", "rays": rays}, {**sheet, "at": at, "rotation": rotation}):
+            seen = traced(n, sources=[light], detectors=detectors).rays
+            assert (len(seen["on"]), seen["above"].total_flux) == (0, pytest.approx(1.0, abs=3 / n))
 
 
 @pytest.mark.slow

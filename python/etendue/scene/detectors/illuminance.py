@@ -117,8 +117,8 @@ def _chance_told(counted: Counted) -> Iterator[str]:
     missed = int((counted.rays == 0).sum())
     if missed == flux.size:
         yield (
-            "no ray met it on the side of its +z: it is dark there, faces away from the light, or was missed by chance; "
-            "'toward' turns it, and more rays tell"
+            "no ray met it on the side of its +z: it is dark there, faces away from the light, was missed by chance, or the "
+            "light starts on it, which does not count; 'toward' turns it, and more rays tell"
         )
     elif missed:
         yield (
