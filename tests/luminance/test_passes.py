@@ -16,7 +16,7 @@ def passes(lit: Array) -> Passes:
     found = Passes((SIDE, SIDE), np.ones((SIDE, SIDE)))
     for light in lit:
         nothing = np.zeros_like(light)
-        found.add(light, nothing, nothing, nothing, np.ones_like(light))
+        found.add(light, nothing, nothing, nothing, np.ones_like(light), light)
     return found
 
 

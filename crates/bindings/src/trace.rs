@@ -196,8 +196,9 @@ pub fn work_unit<'py>(
     Ok(dict)
 }
 
-/// Of each pass and pixel, five numbers; and one of all together.
+/// Of each pass and pixel, six numbers; and two of all together.
 type Looks<'py> = (
+    Bound<'py, PyArray3<f64>>,
     Bound<'py, PyArray3<f64>>,
     Bound<'py, PyArray3<f64>>,
     Bound<'py, PyArray3<f64>>,
@@ -208,7 +209,7 @@ type Looks<'py> = (
 
 /// Looks at a scene: for each of the passes `first..last` and each pixel, row by row, the mean luminance, the part of it that
 /// is found by chance, and the sources' own deviation \[flux unit/(mm² sr)\]; and the shares of the lines that meet a smooth
-/// surface first, and that see a diffuse one directly. Beside them the sum over passes and pixels of the mean weight that
+/// surface first, and that see a diffuse one directly; and the mean luminance of light that was scattered on its way. Beside them the sum over passes and pixels of the mean weight that
 /// lines still had when they were given up, having met as many surfaces as they may, and when they were lost.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
@@ -276,6 +277,7 @@ pub fn look_at_scene<'py>(
         array(|p| p.deviation)?,
         array(|p| p.met[0])?,
         array(|p| p.met[1])?,
+        array(|p| p.scattered)?,
         (sum(|p| p.given_up), sum(|p| p.lost)),
     ))
 }

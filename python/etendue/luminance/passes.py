@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from etendue.luminance.caustics import FEW, Forward, at_least_nearby
 from etendue.luminance.gathering import blocks
+from etendue.luminance.rare_light import RareLight
 from etendue.quantities.relative_error import RelativeError
 
 Array = npt.NDArray[np.float64]
@@ -38,7 +39,7 @@ class Passes:
     >>> one = np.ones((1, 1))
     >>> passes = Passes((1, 1), one)
     >>> for light in (1.0, 2.0, 3.0, 2.0):
-    ...     passes.add(light * one, 0 * one, 0 * one, 0 * one, one)
+    ...     passes.add(light * one, 0 * one, 0 * one, 0 * one, one, light * one)
     >>> values, error = passes.total(None)
     >>> float(values[0, 0]), round(float(error[0, 0]) ** -2)     # (1 + 0 + 1 + 0)/(3 · 4) = 1/6
     (2.0, 6)
@@ -58,6 +59,7 @@ class Passes:
         self._area, self._shape, self._window, self._compared = area, shape, window, compared
         part = area[window].shape
         self._all = _Spread(part)
+        self._rare = RareLight(part)
         self._chance = _Spread(part)
         self._lucky = np.zeros(part, dtype=np.int64)
         self._lit = np.zeros(part, dtype=np.int64)
@@ -65,19 +67,23 @@ class Passes:
         self._diffuse = np.zeros(part, dtype=bool)
         self._deviation = np.zeros(part)
 
-    def add(self, values: Array, chance: Array, deviation: Array, smooth: Array, diffuse: Array) -> None:
+    def add(
+        self, values: Array, chance: Array, deviation: Array, smooth: Array, diffuse: Array, scattered: Array
+    ) -> None:
         """One pass more.
 
-        Its mean luminances, what of them was found by chance, the deviation that sources state of theirs, and the shares of
-        the lines that met a smooth surface first, and that saw a diffuse one directly.
+        Its mean luminances, what of them was found by chance, the deviation that sources state of theirs, the shares of
+        the lines that met a smooth surface first, and that saw a diffuse one directly, and the luminance of the light that
+        was scattered on its way.
         """
         self.done += 1
         if self._compared:
             self.blocks.append(blocks(values))
-        values, chance, deviation, smooth, diffuse = (
-            sums[self._window] for sums in (values, chance, deviation, smooth, diffuse)
+        values, chance, deviation, smooth, diffuse, scattered = (
+            sums[self._window] for sums in (values, chance, deviation, smooth, diffuse, scattered)
         )
         self._all.add(values, self.done)
+        self._rare.add(scattered)
         self._lit += values > 0.0
         # Of nothing so far, nothing more changes neither mean nor spread.
         if chance.any() or self._lucky.any():
@@ -92,7 +98,7 @@ class Passes:
         """The luminance of both routes and its standard error; with what the sources know of their own, if `known`.
 
         What is found by chance, in few passes of a pixel, errs by no less than in its neighbourhood; so does all light of a
-        pixel that sees a diffuse surface and found light in few passes.
+        pixel that sees a diffuse surface and found light in few passes, and light that is scattered and rare (`RareLight`).
         """
         chance, found = self._chance.variance(self.done), self._all.variance(self.done)
         # Whoever found light in each pass needs no neighbours.
@@ -101,6 +107,7 @@ class Passes:
             found + (at_least_nearby(chance, self._lucky, self._smooth) - chance),
             at_least_nearby(found, lit, self._diffuse),
         )
+        variance = np.maximum(variance, self._rare.least_variance(self._diffuse))
         if known:
             variance = variance + self._deviation**2
         values = self._whole(self._all.mean)

@@ -63,7 +63,10 @@ impl PathBlock<'_> {
         let line = branch.selective.then_some(path.line as usize);
         let light = known.at(self.lit, place, branch.travelled, line, all);
         let Some(light) = light else { return Known::Nothing };
-        self.paths[branch.path as usize].sum[0] += branch.weight * light * event.leaving(parts);
+        let found = branch.weight * light * event.leaving(parts);
+        let path = &mut self.paths[branch.path as usize];
+        path.sum[0] += found;
+        path.scattered += found;
         parts.rest.map_or(Known::All, |rest| Known::But(&**rest))
     }
 
@@ -216,6 +219,7 @@ impl PathBlock<'_> {
             for (sum, light) in path.sum.iter_mut().zip(connection.light) {
                 *sum += seen * light;
             }
+            path.scattered += seen * connection.light[0];
         }
         self.connections.clear();
         self.shadows.clear();

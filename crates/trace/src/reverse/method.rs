@@ -34,12 +34,14 @@ pub struct Method<'a> {
     pub glints: Option<&'a Glints>,
 }
 
-/// Sums over passes: of the mean of each pass, of that part of it which is found by chance only, of the sources' own
+/// Sums over passes: of the mean of each pass, of those parts of it which were scattered and which are found by chance only, of the sources' own
 /// deviation, and of the shares of the lines of sight that meet smooth and diffuse surfaces first.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pixel {
     /// Mean luminance of the lines.
     pub mean: f64,
+    /// That part of it which was scattered on its way.
+    pub scattered: f64,
     /// Mean of the light that drawn directions bring to a source through smooth surfaces, where rays forwards cannot take it
     /// over: rare, and bright.
     pub chance: f64,

@@ -117,6 +117,8 @@ pub(super) struct Path {
     /// Whether it met a smooth surface first, and whether it saw a diffuse one directly.
     pub(super) met: [bool; 2],
     pub(super) sum: [f64; 2],
+    /// Of the light, that which was scattered on its way.
+    pub(super) scattered: f64,
     /// Of the light, that which was found by chance.
     pub(super) chance: f64,
     /// Weight of its branches that met more surfaces than they may.

@@ -125,7 +125,7 @@ impl<'a> Renderer<'a> {
 
     /// The passes of pixels of some numbers, pixel by pixel.
     fn paint(&mut self, which: &[usize], passes: Range<u32>, pixels: &mut [Pixel]) {
-        let mut cells = vec![[0.0; 7]; which.len() * passes.len()];
+        let mut cells = vec![[0.0; 8]; which.len() * passes.len()];
         let all: Vec<usize> = (0..cells.len()).collect();
         self.look(&all, which, &passes, false, &mut cells);
         // Once more those with small images of sources.
@@ -134,9 +134,12 @@ impl<'a> Renderer<'a> {
             let those: Vec<usize> = all.into_iter().filter(has).collect();
             self.look(&those, which, &passes, true, &mut cells);
         }
-        for (pixel, [mean, deviation, chance, smooth, diffuse, given_up, lost]) in pixels.iter_mut().zip(cells) {
+        for (pixel, [mean, deviation, scattered, chance, smooth, diffuse, given_up, lost]) in
+            pixels.iter_mut().zip(cells)
+        {
             *pixel = Pixel {
                 mean,
+                scattered,
                 chance,
                 deviation,
                 met: [smooth, diffuse],
@@ -147,7 +150,7 @@ impl<'a> Renderer<'a> {
     }
 
     /// Adds the paths of some cells, each a pass of a pixel.
-    fn look(&mut self, tasks: &[usize], which: &[usize], passes: &Range<u32>, aimed: bool, cells: &mut [[f64; 7]]) {
+    fn look(&mut self, tasks: &[usize], which: &[usize], passes: &Range<u32>, aimed: bool, cells: &mut [[f64; 8]]) {
         let paths = paths_of(self.block.method, aimed) as usize;
         let share = 1.0 / f64::from(self.block.method.paths);
         let total = tasks.len() * paths;
@@ -177,7 +180,8 @@ impl<'a> Renderer<'a> {
                     let [smooth, diffuse] = path.met.map(|met| if met { 1.0 } else { 0.0 });
                     let [mean, deviation] = path.sum;
                     let [given_up, lost] = [path.given_up, path.lost].map(f64::from);
-                    let values = [mean, deviation, path.chance, smooth, diffuse, given_up, lost];
+                    let [scattered, chance] = [path.scattered, path.chance];
+                    let values = [mean, deviation, scattered, chance, smooth, diffuse, given_up, lost];
                     for (sum, value) in sums.iter_mut().zip(values) {
                         *sum += value * share;
                     }
@@ -216,6 +220,7 @@ impl<'a> Renderer<'a> {
             begun: false,
             met: [false; 2],
             sum: [0.0; 2],
+            scattered: 0.0,
             chance: 0.0,
             given_up: 0.0,
             lost: 0.0,

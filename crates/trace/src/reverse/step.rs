@@ -145,6 +145,9 @@ impl PathBlock<'_> {
                 }
                 path.sum[0] += weight * hit.luminance;
                 path.sum[1] += weight * hit.deviation;
+                if branch.scatters > 0 {
+                    path.scattered += weight * hit.luminance;
+                }
                 if branch.drawn && !branch.direct {
                     path.chance += weight * hit.luminance;
                 }
