@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 
 import etendue as et
@@ -104,6 +105,7 @@ def patches() -> Iterator[tuple[Array, Array]]:
         yield points, WALL / np.pi * irradiance * wide * tall
 
 
+@functools.cache
 def floor_luminance() -> Array:
     """Of the floor z = 0, which sees the wall and not the face of the lamp, in each pixel [cd/m²]."""
     place = ((np.arange(2 * PIXELS) + 0.5) / (2 * PIXELS) - 0.5) * WIDTH
@@ -115,6 +117,7 @@ def floor_luminance() -> Array:
     return seen.reshape(PIXELS, 2, PIXELS, 2).mean(axis=(1, 3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lines", "seeds"), [(64, 6), (256, 6), (1024, 3)])
 def test_a_floor_that_sees_a_wall_with_a_lamp_close_to_it(lines: int, seeds: int) -> None:
     """The light of few lines of sight, those that meet the wall beside the lamp, is nearly all there is."""

@@ -55,6 +55,7 @@ class RareLight:
         self._passes = 0
         self._shape = shape
         self._moments: list[Array] | None = None
+        self._room: list[Array] = []
 
     def add(self, values: Array) -> None:
         """One pass more: moments about the mean up to the fourth, updated as in [Pebay2008]."""
@@ -63,13 +64,24 @@ class RareLight:
             if not values.any():
                 return
             self._moments = [np.zeros(self._shape) for _ in range(4)]
-        n, (mean, second, third, fourth) = self._passes, self._moments
-        off = values - mean
-        step = off / n
-        more = off * step * (n - 1)
-        square = step * step
-        fourth += more * square * (n * n - 3 * n + 3) + 6.0 * square * second - 4.0 * step * third
-        third += more * step * (n - 2) - 3.0 * step * second
+            # Room for what comes in between: memory that is asked for again for each pass takes longer than the sums.
+            self._room = [np.zeros(self._shape) for _ in range(4)]
+        n, (mean, second, third, fourth), (off, step, more, part) = self._passes, self._moments, self._room
+        np.subtract(values, mean, out=off)
+        np.divide(off, n, out=step)
+        np.multiply(off, step, out=more)
+        more *= n - 1
+        square = np.multiply(step, step, out=off)
+        for sums, one, other, times in (
+            (fourth, more, square, n * n - 3 * n + 3),
+            (fourth, square, second, 6),
+            (fourth, step, third, -4),
+            (third, more, step, n - 2),
+            (third, step, second, -3),
+        ):
+            np.multiply(one, other, out=part)
+            part *= times
+            np.add(sums, part, out=sums)
         second += more
         mean += step
 
