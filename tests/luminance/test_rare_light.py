@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 from etendue.luminance.rare_light import RareLight
 from oracles.verdicts import REVERSE, SIGNIFICANCE
-from scipy.stats import norm, t
+from scipy.stats import binom, norm, t
 
 Array = npt.NDArray[np.float64]
 
@@ -27,11 +27,11 @@ def errors(*, light: Array) -> tuple[Array, Array]:
     return np.sqrt(own), np.sqrt(np.maximum(own, rare.least_variance(EVERY)))
 
 
-@pytest.mark.parametrize("chance", [0.05, 0.03, 0.01])
+@pytest.mark.parametrize("chance", [0.1, 0.05, 0.03])
 def test_pixels_that_found_none_of_it_err_by_the_share_of_their_neighbours(chance: float) -> None:
     """Light of 1 in each pass, and of 1/p in a share p of them: the variance is (1/p − 1)/n, and few pixels are far off.
 
-    Found in three passes or more, which for p = 0.05 holds 0.14 of the variance, light is not rare.
+    Light is rare that was found in one pass or two; so much of the variance is theirs.
     """
     rng = np.random.default_rng(6)
     light = rng.normal(1.0, 0.05, (PASSES, *SIDE)) + (rng.random((PASSES, *SIDE)) < chance) / chance
@@ -39,10 +39,12 @@ def test_pixels_that_found_none_of_it_err_by_the_share_of_their_neighbours(chanc
     off = np.abs(light.mean(axis=0) - 2.0)
     most = float(t.isf(0.001, PASSES - 1))
     assert np.mean(off > most * own) > 0.1
-    assert np.mean(off > most * least) < 0.01
+    # None within a pixel of it: 9 times 16 passes.
+    assert np.mean(off > most * least) < 0.005 + 2.0 * (1.0 - chance) ** (9 * PASSES)
     known = (1.0 / chance - 1.0) / PASSES
+    share = sum(k * binom.pmf(k, PASSES, chance) for k in (1, 2)) / (PASSES * chance)
     unlucky = own < 0.1
-    assert 0.7 * known < np.mean(least[unlucky] ** 2) < 1.1 * known
+    assert 0.85 * share * known < np.mean(least[unlucky] ** 2) < known
 
 
 def test_moments_are_those_of_two_passes_over_the_values() -> None:
@@ -118,7 +120,7 @@ def floor_luminance() -> Array:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("lines", "seeds"), [(64, 6), (256, 6), (1024, 3)])
+@pytest.mark.parametrize(("lines", "seeds"), [(256, 10), (1024, 5)])
 def test_a_floor_that_sees_a_wall_with_a_lamp_close_to_it(lines: int, seeds: int) -> None:
     """The light of few lines of sight, those that meet the wall beside the lamp, is nearly all there is."""
     lamp = {"kind": "surface", "shape": {"kind": "rectangle", "width": LAMP, "height": LAMP}, "flux": FLUX,
@@ -133,8 +135,9 @@ def test_a_floor_that_sees_a_wall_with_a_lamp_close_to_it(lines: int, seeds: int
     maps = [et.luminance_map(scene, observer, screen, method=method) for method in methods]
     values, error = (np.array([getattr(lmap, name) for lmap in maps]) for name in ("values", "standard_error"))
     expected = floor_luminance()
-    # The mean of all pixels, and no more pixels far off than normal ones; χ² of so few events is none.
+    # The mean of all pixels, and few of them far off; χ² of so few finds is none. By their own spread alone a quarter and a
+    # tenth of them are as far off as one normal pixel in a hundred.
     pooled = (values - expected).mean() / np.sqrt(np.mean(error**2) / values.size)
     assert abs(pooled) < norm.isf(SIGNIFICANCE / 2)
     far = np.abs(values - expected) > t.isf(0.005, REVERSE) * error
-    assert far.mean() < 0.03
+    assert far.mean() < 0.06

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
@@ -15,12 +13,6 @@ FEWEST = 12
 RARE = 3.0
 """Passes that hold the spread of a pixel, fewer than which are few: of 16 normal ones it is more than 5."""
 
-BORDERS = (1, 4, 12)
-"""Pixels on each side of one, of the neighbourhoods in which rare light is looked for: the rarer it is, the farther off."""
-
-FEWEST_FINDS = 2
-"""Pixels of a neighbourhood that have found rare light: one alone may be an accident of its own spread."""
-
 
 class RareLight:
     """Variances that pixels have at least, by scattered light that single passes found, theirs or those of their neighbours.
@@ -30,9 +22,10 @@ class RareLight:
     of a pixel's passes is held by K = (Σ d²)²/Σ d⁴ of them, d being what each differs from their mean: n over their
     kurtosis, about n/3 of n normal ones, and about 1 if a single pass differs. Where K is small
 
-    - the pixel's own variance rests on few passes, and is no less than the mean of those beside it;
-    - it is that of rare light, and its mean over a neighbourhood is what every pixel there is expected to have of it, found
-      or not; farther off than the next pixels, relative to the luminance that is usual at either place.
+    - the pixel's own variance rests on few passes, and is no less than the median of those beside it;
+    - it is that of rare light, and its mean over the pixel and those beside it is what each of them is expected to have of
+      it, found or not. Where the regular light is less, rare light of the same kind is as much rarer: its variance is in
+      proportion.
 
     Parameters
     ----------
@@ -47,8 +40,8 @@ class RareLight:
     >>> rare = RareLight((2, 2))
     >>> for values in light:
     ...     rare.add(values)
-    >>> rare.least_variance(np.ones((2, 2), dtype=bool)).round(3).tolist()      # 2 · (32/16)² · 1/4
-    [[2.0, 2.0], [2.0, 2.0]]
+    >>> rare.least_variance(np.ones((2, 2), dtype=bool)).round(3).tolist()      # (32/16)², and 2/4 of it
+    [[4.0, 4.0], [2.0, 2.0]]
     """
 
     def __init__(self, shape: tuple[int, int]) -> None:
@@ -101,30 +94,41 @@ class RareLight:
         if not rare.any():
             return np.zeros(self._shape)
         variance = second / (self._passes * (self._passes - 1))
-        root = np.sqrt(np.maximum(mean, 0.0))
-        least = np.zeros(self._shape)
-        for border in BORDERS:
-            pixels = np.maximum(_around(possible, border), 1.0)
-            several = _around(rare, border) >= FEWEST_FINDS
-            if border == BORDERS[0]:
-                every, found = (_around(part, border) / pixels for part in (variance, variance * rare))
-                least = np.where(rare, every, np.where(several, found, 0.0))
-                continue
-            usual = (_around(root, border) / pixels) ** 2
-            relative = np.divide(variance * rare, usual**2, out=np.zeros(self._shape), where=usual > 0.0)
-            found = np.where(several, _around(relative, border) / pixels, 0.0)
-            least = np.maximum(least, found * np.minimum(mean, usual) ** 2)
-        return np.where(possible, least, 0.0)
+        beside = _mean_beside(variance, rare, _regular(self._moments, self._passes), possible)
+        return np.where(possible, np.maximum(_median_beside(variance, rare), beside), 0.0)
 
 
-def _around(values: npt.NDArray[Any], border: int) -> Array:
-    """Sums over each pixel and its neighbours, of values that are not negative."""
-    sums = values.astype(np.float64)
-    for axis in (0, 1):
-        sums = np.moveaxis(sums, axis, 0)
-        last = len(sums)
-        up_to = np.concatenate([np.zeros((1, sums.shape[1])), sums.cumsum(axis=0)])
-        place = np.arange(last)
-        sums = up_to[np.minimum(place + border + 1, last)] - up_to[np.maximum(place - border, 0)]
-        sums = np.moveaxis(np.maximum(sums, 0.0), 0, axis)
-    return sums
+def _regular(moments: list[Array], passes: int) -> Array:
+    """The luminance of pixels without what K of the passes found beside, each of them alike."""
+    mean, second, _, fourth = moments
+    even = np.full(mean.shape, passes / 2)
+    held = np.divide(second * second, fourth, out=even, where=fourth > 0.0).clip(1.0, passes / 2)
+    regular: Array = np.maximum(mean - np.sqrt(second / passes * held / (passes - held)), 0.0)
+    return regular
+
+
+def _mean_beside(
+    variance: Array, rare: npt.NDArray[np.bool_], regular: Array, possible: npt.NDArray[np.bool_]
+) -> Array:
+    """Of all pixels, the mean of the variance of rare light there and in the next pixels."""
+    rows, columns = variance.shape
+    padded = [np.pad(part.astype(np.float64), 1) for part in (variance * rare, regular, possible)]
+    sums, pixels = np.zeros(variance.shape), np.zeros(variance.shape)
+    for row, column in np.ndindex(3, 3):
+        found, level, counts = (part[row : row + rows, column : column + columns] for part in padded)
+        sums += found * np.divide(regular, level, out=np.ones(variance.shape), where=level > regular)
+        pixels += counts
+    return sums / np.maximum(pixels, 1.0)
+
+
+def _median_beside(values: Array, which: npt.NDArray[np.bool_]) -> Array:
+    """Of those pixels, the median of their values and those of the next pixels; 0 of others."""
+    rows, columns = np.nonzero(which)
+    beside = np.array(np.meshgrid([-1, 0, 1], [-1, 0, 1])).reshape(2, -1, 1)
+    # What lies beyond an edge is the pixel at the edge once more.
+    those = (
+        np.clip(at + step, 0, size - 1) for at, step, size in zip((rows, columns), beside, values.shape, strict=True)
+    )
+    result = np.zeros(values.shape)
+    result[rows, columns] = np.median(values[tuple(those)], axis=0)
+    return result
