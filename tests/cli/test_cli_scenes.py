@@ -61,6 +61,11 @@ def test_trace_is_the_trace_of_the_api(run: Run, tmp_path: Path) -> None:
     assert et.TraceResult.load(tmp_path / "r.h5").ledger == result.ledger
     top = et.read_illuminance_map(tmp_path / "top.npz")
     np.testing.assert_array_equal(top.values, result.illuminance.only.values)
+    told = {detector["kind"]: detector for detector in facts["detectors"]}
+    assert told["illuminance"]["mean"] == top.mean
+    assert told["illuminance"]["maximum"] == top.values.max()
+    assert told["illuminance"]["maximum_error"] == top.standard_error[top.values == top.values.max()][0]
+    assert told["rays"]["flux"] == result.rays.only.total_flux
     assert len(et.read_rays(tmp_path / "rcs.tm25ray")) == len(result.rays.only)
     assert et.read_intensity(tmp_path / "far.ies").maximum == pytest.approx(result.intensity.only.maximum, rel=1e-4)
 

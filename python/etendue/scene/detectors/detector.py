@@ -13,6 +13,7 @@ import numpy.typing as npt
 from etendue.description.files import Files
 from etendue.description.keys import Description
 from etendue.quantities.node_choice import Choice
+from etendue.quantities.pixel_map import PixelMap
 from etendue.quantities.provenance import Provenance
 from etendue.scene.dealing import Array, CellSums, Dealing
 from etendue.scene.observers import ObserverKeys
@@ -200,3 +201,24 @@ class Detector(Description, abc.ABC):
     @abc.abstractmethod
     def detection(self, name: str, setting: Setting) -> Detection[Any]:
         """What it measures in its scene, under a name that no other detector there has."""
+
+
+def brightest_of(quantity: PixelMap) -> dict[str, Any]:
+    """The brightest pixel or cell of a map, and how many there are, as plain data for JSON.
+
+    Examples
+    --------
+    >>> import etendue as et
+    >>> lmap = et.luminance_map(et.RingSource(rays=2000), et.Observer(), et.Screen(60, 60, 4, 3))
+    >>> brightest_of(lmap)["columns"]
+    4
+    """
+    rows, columns = quantity.values.shape
+    brightest = np.unravel_index(np.argmax(quantity.values), quantity.values.shape)
+    return {
+        "maximum": float(quantity.values[brightest]),
+        "maximum_error": float(quantity.standard_error[brightest]),
+        "unit": quantity.unit,
+        "columns": columns,
+        "rows": rows,
+    }

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from statistics import NormalDist
 from types import MappingProxyType
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ from etendue.quantities.illuminance_map import IlluminanceMap, Point
 from etendue.quantities.observer import Screen
 from etendue.quantities.powers_of_ten import counted, rounded
 from etendue.scene.dealing import CellSums, Dealing
-from etendue.scene.detectors.detector import Counted, Detection, Detector, Record, Recorded, Setting
+from etendue.scene.detectors.detector import Counted, Detection, Detector, Record, Recorded, Setting, brightest_of
 from etendue.scene.observers import ObserverKeys
 from etendue.scene.placement import Placement
 from etendue.units import MM2_PER_M2
@@ -80,6 +80,10 @@ class GridIlluminance(Detection[IlluminanceMap]):
     def summary(self, quantity: IlluminanceMap) -> str:
         """Mean and uniformity."""
         return f"mean {counted(quantity.mean, quantity.unit)}, least/mean {rounded(quantity.uniformity, 3)}"
+
+    def figures(self, quantity: IlluminanceMap) -> dict[str, Any]:
+        """Mean and uniformity, the brightest cell, and how many there are."""
+        return {"mean": quantity.mean, "uniformity": quantity.uniformity, **brightest_of(quantity)}
 
 
 def lowered_by_chance(values: Array, errors: Array) -> float:

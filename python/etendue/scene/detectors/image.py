@@ -11,7 +11,7 @@ from etendue.errors import UnknownNameError
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.observer import Observer, Screen, observer_from_dict
 from etendue.quantities.powers_of_ten import counted
-from etendue.scene.detectors.detector import Detection, Detector, Record, Recorded, Setting
+from etendue.scene.detectors.detector import Detection, Detector, Record, Recorded, Setting, brightest_of
 from etendue.scene.observers import ObserverKeys
 from etendue.units import MM2_PER_M2
 
@@ -64,6 +64,10 @@ class DiffuseLuminance(Detection[LuminanceMap]):
     def summary(self, quantity: LuminanceMap) -> str:
         """The brightest pixel."""
         return f"maximum {counted(float(quantity.values.max()), quantity.unit)}"
+
+    def figures(self, quantity: LuminanceMap) -> dict[str, Any]:
+        """The brightest pixel, and how many there are."""
+        return brightest_of(quantity)
 
 
 class LightImage(Detector):

@@ -47,8 +47,8 @@ class IncidentRays(Detection[RaySet]):
         return f"{len(quantity):,} rays, {counted(quantity.total_flux, quantity.flux_unit)}"
 
     def figures(self, quantity: RaySet) -> dict[str, Any]:
-        """How many there are."""
-        return {"rays": len(quantity)}
+        """How many there are, and their flux."""
+        return {"rays": len(quantity), "flux": quantity.total_flux, "flux_unit": quantity.flux_unit}
 
 
 class RayCollector(Detector, Placement):
