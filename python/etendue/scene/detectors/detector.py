@@ -209,7 +209,7 @@ def brightest_of(quantity: PixelMap) -> dict[str, Any]:
     Examples
     --------
     >>> import etendue as et
-    >>> lmap = et.luminance_map(et.RingSource(rays=2000), et.Observer(), et.Screen(60, 60, 4, 3))
+    >>> lmap = et.luminance_map(et.RingSource(rays=2000), et.Observer(0, 0, 500), et.Screen(60, 60, 4, 3))
     >>> brightest_of(lmap)["columns"]
     4
     """
