@@ -345,12 +345,14 @@ def test_the_method_suits_the_scans_if_none_is_stated() -> None:
     method, why = suited(at_random(f=0.25))
     assert method == "natural-neighbours"
     assert "azimuths about the specular direction, and make no scans" in why
-    for scans, method, told in ((in_plane(f=0.25), "smooth", []), (one_side, "smooth", ["at one azimuth"])):
+    # From the specular direction to the horizon ahead it is 0.5 in direction cosines, and back from it 1.5.
+    both = ["at one azimuth", "beyond the measured directions"]
+    for scans, method, told in ((in_plane(f=0.25), "smooth", []), (one_side, "smooth", both)):
         table = et.Bsdf.from_scans(scans)
         assert isinstance(table, et.BsdfTable)
         assert table.data.facts["interpolation"] == method
         for complaint, part in zip(table.complaints, told, strict=True):
-            assert f"method {method}" in str(complaint)
+            assert ("beyond" in part) != (f"method {method}" in str(complaint))
             assert part in str(complaint)
 
 

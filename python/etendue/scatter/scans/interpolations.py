@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.extras import require
-from etendue.formats.bsdf.points import below_zero
 from etendue.quantities.arguments import SCANS, require_known
 from etendue.quantities.arguments import require as require_kind
 from etendue.quantities.bsdf_data import BsdfData
@@ -20,6 +19,7 @@ from etendue.quantities.polar_grid import PolarGrid
 from etendue.quantities.report import Complaint
 from etendue.scatter.scans import harvey_shack
 from etendue.scatter.scans.arms import AT_CENTRE, MOST_ARMS, ON_ARM, apart, arms_of, azimuths_of, beside
+from etendue.scatter.scans.notices import BelowZero, Beyond, even_directions, outside
 from etendue.scatter.scans.scans import NEAR, SAME, Scans
 from etendue.scatter.scans.smoothing import require_light, smooth
 
@@ -236,6 +236,20 @@ LOGARITHMIC = ("radial-basis", "smooth")
 """Those that take logarithms, and need light."""
 
 
+GOING_ON = ("natural-neighbours", "radial-basis", "shepard", "smooth")
+"""Those that go on with f beyond the measured directions; the others have nothing at the horizon, or outside."""
+
+
+def _light_beyond(one: BsdfSlice, method: str, incident: Array, measured: Array) -> float:
+    """The share of the light of a slice outside the measured directions, or for `smooth` further out than the furthest."""
+    to = even_directions()
+    points, wanted = _planar(incident, measured), _planar(incident, to)
+    furthest = np.hypot(*points.T).max() + ON_A_LINE
+    there = np.hypot(*wanted.T) > furthest if method == "smooth" else outside(points, wanted)
+    behind = to[there] * [1.0, 1.0, -1.0 if one.transmitted else 1.0]
+    return float(one.at(behind).sum()) * np.pi / len(to)
+
+
 def suited(scans: Scans) -> tuple[str, str]:
     """The method for scans of which nothing else is known, and why it is not the usual one.
 
@@ -365,9 +379,10 @@ def tabulated(scans: Scans, method: str = AUTOMATIC, smallest: float = SMALLEST)
         told = f"method {own}" + (" for transmitted light" if transmitted else "")
         complaints += [Complaint("note", told, why)] if why else []
         methods += [own] if own not in methods else []
-        below = _BelowZero()
-        slices += _slices(way, own, radial_coordinates(smallest), turns, below, transmitted=transmitted)
-        complaints += below.told(way.values, f"{'transmitted' if transmitted else 'reflected'} light")
+        below, beyond = BelowZero(), Beyond()
+        slices += _slices(way, own, radial_coordinates(smallest), turns, (below, beyond), transmitted=transmitted)
+        light = f"{'transmitted' if transmitted else 'reflected'} light"
+        complaints += [*below.told(way.values, light), *beyond.told(light)]
     return BsdfData(
         tuple(slices),
         isotropic=len(turns) <= 1,
@@ -378,29 +393,14 @@ def tabulated(scans: Scans, method: str = AUTOMATIC, smallest: float = SMALLEST)
     )
 
 
-class _BelowZero:
-    """What values below 0 do to the shares: at the incidence where it is most."""
-
-    def __init__(self) -> None:
-        self.most: tuple[float, float, float] | None = None
-
-    def note(self, theta: float, share: float, lifted: float) -> None:
-        """The share at an incidence, and what it would be if values below 0 were 0."""
-        if self.most is None or lifted - share > self.most[2] - self.most[1]:
-            self.most = theta, share, lifted
-
-    def told(self, values: Array, place: str) -> list[Complaint]:
-        """How many they are, and their light."""
-        found = below_zero(values, place)
-        if self.most is not None:
-            theta, share, lifted = self.most
-            more = f": at {theta:.3g}° of incidence it is {share:.4g}, and would be {lifted:.4g} if they were 0"
-            found = [dataclasses.replace(one, found=one.found + more) for one in found]
-        return found
-
-
 def _slices(
-    scans: Scans, method: str, radial: Array, turns: Sequence[float], below: _BelowZero, *, transmitted: bool
+    scans: Scans,
+    method: str,
+    radial: Array,
+    turns: Sequence[float],
+    notices: tuple[BelowZero, Beyond],
+    *,
+    transmitted: bool,
 ) -> Iterator[BsdfSlice]:
     """A slice for each incidence of what is reflected, or of the mirror image of what is transmitted."""
     for measured, own in scans.by_incidence():
@@ -439,7 +439,9 @@ def _slices(
             lifted[there], _ = METHODS[method](
                 incident, scans.scattered[own], np.maximum(scans.values[own], 0.0), at[there]
             )
-            below.note(one.theta, share, dataclasses.replace(one, values=lifted).integral())
+            notices[0].note(one.theta, share, dataclasses.replace(one, values=lifted).integral())
+        if method in GOING_ON:
+            notices[1].note(one.theta, share, _light_beyond(one, method, incident, scans.scattered[own]))
         factor = 1.0
         if scans.reflectance is not None:
             if not share > 0.0:
