@@ -261,6 +261,16 @@ def test_files_for_other_verbs_are_answered(run: Run, scans: list[Path]) -> None
     assert not Path("film.binary").exists()
 
 
+def test_scans_that_determine_no_model_are_refused_with_their_file(run: Run) -> None:
+    """f = 0.1 everywhere has no lobe: neither height nor width of one is determined."""
+    rows = [f"30,180,{s},{p},0.1" for s in range(0, 85, 5) for p in (0, 180)]
+    Path("flat.csv").write_text("theta_i,phi_i,theta_s,phi_s,bsdf\n" + "\n".join(rows) + "\n")
+    outcome = run("bsdf", "fit", "flat.csv", "-o", "flat.h5", "--model", "lambertian+gaussian")
+    assert outcome.status == 1
+    assert "flat.csv: the scans do not determine" in outcome.err
+    assert not Path("flat.h5").exists()
+
+
 def test_the_family_of_verbs_installs_nothing(run: Run) -> None:
     assert "completion" not in run("bsdf", "--help").out
 

@@ -259,10 +259,10 @@ def fit(
         transmittance=transmittance,
         blank=blank,
     )
+    named = ", ".join(file.name for file in files)
     if fitted is not None:
-        _fit_model(scans, fitted, output, json=json)
+        _fit_model(scans, named, fitted, output, json=json)
     else:
-        named = ", ".join(file.name for file in files)
         _fit_table(scans, named, chosen or AUTOMATIC, output, json=json)
 
 
@@ -280,8 +280,11 @@ def _refuse_idle(files: list[Path]) -> None:
         refuse(of_stages, "for scans of stages and fluxes, and none of the files is one")
 
 
-def _fit_model(scans: Scans, model: str, output: Path, *, json: bool) -> None:
-    found = fit_bsdf(scans, model)
+def _fit_model(scans: Scans, named: str, model: str, output: Path, *, json: bool) -> None:
+    try:
+        found = fit_bsdf(scans, model)
+    except ArgumentError as error:
+        raise ArgumentError(f"{named}: {error}") from error
     notes = [*found.notes, *write_bsdf(output, found.table)]
     if json:
         parameters = {
