@@ -527,10 +527,11 @@ def look_at_scene(
 ) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Floats, tuple[float, float]]:
     """What lines of sight find in each of the passes ``first..last`` of `paths` paths, each array (passes, rows, columns).
 
-    Mean luminance, that of the light that drawn directions find behind smooth surfaces, deviation of the sources, and shares
-    of the paths that meet a smooth surface first, and that see a diffuse one directly; luminance of the light that was
-    scattered on its way; and the sums over passes and pixels of the mean weights that paths still had when they were given up, as they had met `most_events` surfaces, and when they
-    were lost, as the solids they were in contradicted the face they met.
+    Mean luminance, that of the light that drawn directions find behind smooth surfaces, deviation of the sources, and
+    shares of the paths that meet a smooth surface first, and that see a diffuse one directly; luminance of the light
+    that was scattered on its way; and the sums over passes and pixels of the mean weights that paths still had when they
+    were given up, as they had met `most_events` surfaces, and when they were lost, as the solids they were in
+    contradicted the face they met.
 
     `left`: light that is not looked for, because rays traced forwards find it. Caustics: what reaches a diffuse surface
     through smooth ones, and from there the eye directly or over other diffuse ones. Scattered: all that reaches the eye
