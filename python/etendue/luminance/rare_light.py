@@ -14,6 +14,10 @@ RARE = 3.0
 """Passes that hold the spread of a pixel, fewer than which are few: of 16 normal ones it is more than 5."""
 
 
+MUCH = 10.0
+"""Times that a pixel is darker than one beside it, beyond which its rare light is taken to be weaker as well as rarer."""
+
+
 class RareLight:
     """Variances that pixels have at least, by scattered light that single passes found, theirs or those of their neighbours.
 
@@ -25,7 +29,7 @@ class RareLight:
     - the pixel's own variance rests on few passes, and is no less than the median of those beside it;
     - it is that of rare light, and its mean over the pixel and those beside it is what each of them is expected to have of
       it, found or not. Where the regular light is less, rare light of the same kind is as much rarer: its variance is in
-      proportion.
+      proportion; where it is much less, it falls by the square.
 
     Parameters
     ----------
@@ -116,7 +120,8 @@ def _mean_beside(
     sums, pixels = np.zeros(variance.shape), np.zeros(variance.shape)
     for row, column in np.ndindex(3, 3):
         found, level, counts = (part[row : row + rows, column : column + columns] for part in padded)
-        sums += found * np.divide(regular, level, out=np.ones(variance.shape), where=level > regular)
+        darker = np.divide(regular, level, out=np.ones(variance.shape), where=level > regular)
+        sums += found * darker * np.minimum(1.0, MUCH * darker)
         pixels += counts
     return sums / np.maximum(pixels, 1.0)
 

@@ -209,8 +209,8 @@ def brightest_of(quantity: PixelMap) -> dict[str, Any]:
     Examples
     --------
     >>> import etendue as et
-    >>> lmap = et.luminance_map(et.RingSource(rays=2000), et.Observer(0, 0, 500), et.Screen(60, 60, 4, 3))
-    >>> brightest_of(lmap)["columns"]
+    >>> eye, screen = et.Observer(0, 0, 500), et.Screen(60, 60, 4, 3)
+    >>> brightest_of(et.luminance_map(et.RingSource(rays=2000), eye, screen, method=et.Cone(acceptance=5)))["columns"]
     4
     """
     rows, columns = quantity.values.shape
