@@ -158,6 +158,32 @@ def test_the_folder_is_bounded_and_what_was_used_last_stays(fits: list[int], mon
     assert len(fits) == made + 1
 
 
+@pytest.mark.usefixtures("fits")
+def test_files_of_other_names_are_neither_counted_nor_removed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The folder may be one in which the user keeps work: neither room that is made nor clearing takes any of it."""
+    folder.mkdir()
+    own = [folder / name for name in ("led.h5", "trace.h5", f"{'0' * 39}g.h5", f"{'0' * 40}.csv", "notes.txt")]
+    for path in own:
+        path.write_bytes(bytes(4096))
+    assert et.cache_content() == fit_cache.CacheContent(folder, 0, 0)
+    monkeypatch.setattr(fit_cache, "MOST_BYTES", 1)
+    seen(led())
+    assert all(path.is_file() for path in own)
+    monkeypatch.setattr(fit_cache, "MOST_BYTES", 1 << 30)
+    seen(led(2))
+    held = et.clear_cache()
+    assert held.fields == 1
+    assert et.cache_content().fields == 0
+    assert sorted(folder.iterdir()) == sorted(own)
+
+
+def test_a_field_that_cannot_be_removed_is_told(folder: Path) -> None:
+    stuck = folder / f"{'a' * 40}.h5"
+    stuck.mkdir(parents=True)  # no user can unlink a folder
+    with pytest.raises(OSError, match=stuck.name):
+        et.clear_cache()
+
+
 def test_a_folder_that_cannot_be_written_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("no folder")
     monkeypatch.setenv(fit_cache.FOLDER_VARIABLE, str(tmp_path / "file" / "kept"))

@@ -13,6 +13,7 @@ import dataclasses
 import functools
 import hashlib
 import os
+import re
 import threading
 from collections import OrderedDict
 from collections.abc import Iterator
@@ -42,6 +43,9 @@ MOST_IN_MEMORY = 4
 
 PIECE = 1 << 18
 """Rays that are digested in one piece."""
+
+KEPT_NAME = re.compile(r"[0-9a-f]{40}\.h5")
+"""Names of the files that are kept, which no others have: what else lies in the folder is neither counted nor removed."""
 
 _memory: OrderedDict[str, LightField] = OrderedDict()
 _lock = threading.Lock()
@@ -139,6 +143,13 @@ def cache_content() -> CacheContent:
 def clear_cache() -> CacheContent:
     """Forget all fields that are kept, in memory and on disk; returns what was there.
 
+    Files of other names in the folder stay.
+
+    Raises
+    ------
+    OSError
+        If the system does not let a file be removed; names it.
+
     Examples
     --------
     >>> import etendue as et
@@ -151,8 +162,7 @@ def clear_cache() -> CacheContent:
         _memory.clear()
     if held.folder is not None:
         for _, _, path in _files(held.folder):
-            with contextlib.suppress(OSError):
-                path.unlink()
+            path.unlink(missing_ok=True)
     return held
 
 
@@ -166,6 +176,8 @@ def _folder() -> Path | None:
 def _files(folder: Path) -> Iterator[tuple[int, int, Path]]:
     """When each file was asked for last [ns], its size and its place."""
     for path in folder.glob("*.h5"):
+        if not KEPT_NAME.fullmatch(path.name):
+            continue
         # Another process may clear it at any moment.
         with contextlib.suppress(OSError):
             facts = path.stat()
