@@ -148,8 +148,9 @@ class _Ledger(TypedDict):
     segments: int
 
 _Numbers: TypeAlias = npt.NDArray[np.uint64]
-_Cells: TypeAlias = tuple[_Floats, _Floats, _Numbers]
-_Units: TypeAlias = tuple[npt.NDArray[np.uint32], _Numbers, _Floats]
+_ConeCells: TypeAlias = tuple[_Floats, _Floats, _Numbers]
+_Cells: TypeAlias = tuple[_Floats, _Floats, _Numbers, _Floats]
+_Units: TypeAlias = tuple[npt.NDArray[np.uint32], _Numbers, _Floats, _Floats]
 _CellTally: TypeAlias = tuple[_Cells, _Units]
 
 class _WorkSums(TypedDict):
@@ -335,7 +336,7 @@ def cone_sums(
     cones: Sequence[_Cone],
     threads: int | None = None,
     progress: _Progress | None = None,
-) -> tuple[list[_Cells], _Tally]:
+) -> tuple[list[_ConeCells], _Tally]:
     """For each cone (Σ w, Σ w², rays), each of shape (acceptances, rows, columns), and the tally."""
 
 def index_leaf() -> int:
@@ -375,7 +376,7 @@ def index_sums(
     cones: Sequence[_Cone],
     threads: int | None = None,
     progress: _Progress | None = None,
-) -> list[tuple[_Cells, int]]:
+) -> list[tuple[_ConeCells, int]]:
     """For each cone (Σ w, Σ w², rays), each of shape (acceptances, rows, columns), and the rays looked at."""
 
 def count_rays(
@@ -474,13 +475,13 @@ class Dealing:
     def done(self, done: int) -> list[int]:
         """Units of each stratum among the first `done` rays."""
 
-    def units(self, rays: npt.NDArray[np.uint64]) -> list[npt.NDArray[np.uint64]]:
-        """The unit of each ray and its stratum, by the rays' numbers in the run."""
+    def units(self, rays: npt.NDArray[np.uint64]) -> tuple[_Numbers, _Numbers, _Floats]:
+        """By the rays' numbers in the run: the unit of each, its stratum, and its flux in the whole run over that of the ray."""
 
     def join(self, open: _Units, copies: _Units, done: int) -> tuple[npt.NDArray[np.uint32], _Numbers, _Cells, _Units]:
         """Adds units of rays with copies to open ones, when `done` rays are given out.
 
-        Cell, stratum and (Σ w, Σ w², units) of what grows, each cell of a stratum once; and the units of which more copies
+        Cell, stratum and (Σ w, Σ w², units, Σ w v) of what grows, each cell of a stratum once; and the units of which more copies
         may come.
         """
 
@@ -542,10 +543,13 @@ def look_at_scene(
 def look_at_events(
     scene: Scene,
     events: npt.NDArray[np.uint64],
+    brought: _Floats,
     view: _View,
     threads: int | None = None,
-) -> tuple[_Floats, _Floats, npt.NDArray[np.uint64]]:
-    """The light image of stored scatter events (n, 15), as cells. The rows of a ray follow each other."""
+) -> _Cells:
+    """The light image of stored scatter events (n, 15), whose rays with all their copies bring such fluxes, as cells. The rows
+    of a ray follow each other.
+    """
 
 def deepest() -> int:
     """How often scatter events are thinned at most."""

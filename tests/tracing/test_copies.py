@@ -57,14 +57,13 @@ def cells_of(rays: et.RaySet) -> npt.NDArray[np.int64]:
 def sum_and_error(rays: et.RaySet, flux: float) -> tuple[Array, Array]:
     """Illuminance of each cell by the n rays of a set, and the standard error of a sample of n of this total flux.
 
-    Σ w² − 2p Σ w v + p² Σ v² with p = Σ w/Σ v of the rays' flux v, of which w is what gets to the cell; of Σ w v it is taken
-    that it is the lesser one of Σ w² and p Σ v².
+    Σ w² − 2p Σ w v + p² Σ v² with p = Σ w/Σ v of the rays' flux v, of which w is what gets to the cell: all of it, or none,
+    so that Σ w v is Σ w².
     """
     v, cell, n = rays.flux * flux / rays.flux.sum(), cells_of(rays), len(rays)
     total, squares = (np.bincount(cell[cell >= 0], u[cell >= 0], 20) for u in (v, v * v))
     share, square = total / flux, (v * v).sum()
-    both = np.minimum(squares, share * square)
-    error = np.sqrt(n / (n - 1) * (squares - 2 * share * both + share**2 * square))
+    error = np.sqrt(n / (n - 1) * (squares - 2 * share * squares + share**2 * square))
     error[total == 0] = np.nan
     return total.reshape(4, 5) / CELL, error.reshape(4, 5) / CELL
 
@@ -193,9 +192,9 @@ def test_the_same_bits_for_threads_and_after_stops(tmp_path: Path) -> None:
     n = (BATCHES + 1.25) * _core.batch_size()
     whole = et.trace(scene, n, 3, threads=2)
     first = next(et.trace_rounds(scene, n, 3, threads=7))
-    assert sum(len(cell) for cell, _, _ in first.sums.open_units) > 20
+    assert sum(len(cell) for cell, *_ in first.sums.open_units) > 20
     assert bits(et.trace(scene, n, 3, threads=1, resume=first)) == bits(whole)
-    assert not any(len(cell) for cell, _, _ in whole.sums.open_units)
+    assert not any(len(cell) for cell, *_ in whole.sums.open_units)
     first.save(tmp_path / "part.h5")
     loaded = TraceResult.load(tmp_path / "part.h5")
     assert bits(loaded) == bits(first)

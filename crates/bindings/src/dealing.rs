@@ -42,19 +42,17 @@ impl Dealing {
         self.0.done(done)
     }
 
-    /// The unit of each ray, and its stratum; by the rays' numbers in the run.
-    fn units<'py>(
-        &self,
-        py: Python<'py>,
-        rays: PyReadonlyArray1<'py, u64>,
-    ) -> PyResult<[Bound<'py, PyArray1<u64>>; 2]> {
-        let mut units = rays.as_slice()?.to_vec();
-        for same in units.chunk_by_mut(|a, b| *a / BATCH == *b / BATCH) {
-            let batch = same[0] / BATCH;
-            self.0.units(batch, same.iter_mut());
-        }
-        let strata: Vec<u64> = units.iter().map(|unit| self.0.stratum(*unit) as u64).collect();
-        Ok([PyArray1::from_vec(py, units), PyArray1::from_vec(py, strata)])
+    /// The unit of each ray, its stratum, and what it brings in the whole run over the flux of the ray; by the rays' numbers
+    /// in the run.
+    fn units<'py>(&self, py: Python<'py>, rays: PyReadonlyArray1<'py, u64>) -> PyResult<RayUnits<'py>> {
+        let of_batch = |same: &[u64]| self.0.units(same[0] / BATCH, same.iter().copied());
+        let parts = rays.as_slice()?.chunk_by(|a, b| *a / BATCH == *b / BATCH);
+        let units: Vec<(u64, f64)> = parts.flat_map(of_batch).collect();
+        Ok((
+            PyArray1::from_iter(py, units.iter().map(|of| of.0)),
+            PyArray1::from_iter(py, units.iter().map(|of| self.0.stratum(of.0) as u64)),
+            PyArray1::from_iter(py, units.iter().map(|of| of.1)),
+        ))
     }
 
     /// Adds units of rays with copies to open ones, when `done` rays are given out: what cells of strata grow by, and the
@@ -77,10 +75,18 @@ impl Dealing {
     }
 }
 
-/// Units of rays with copies as Python hands them over: cell, unit, sum.
+/// Unit, stratum and share of rays.
+type RayUnits<'py> = (
+    Bound<'py, PyArray1<u64>>,
+    Bound<'py, PyArray1<u64>>,
+    Bound<'py, PyArray1<f64>>,
+);
+
+/// Units of rays with copies as Python hands them over: cell, unit, sum, flux.
 type UnitRows<'py> = (
     PyReadonlyArray1<'py, u32>,
     PyReadonlyArray1<'py, u64>,
+    PyReadonlyArray1<'py, f64>,
     PyReadonlyArray1<'py, f64>,
 );
 
@@ -92,8 +98,16 @@ type JoinedArrays<'py> = (
     UnitArrays<'py>,
 );
 
-fn units((cells, units, sums): &UnitRows<'_>) -> PyResult<Vec<Contribution>> {
-    let (cells, units, sums) = (cells.as_slice()?, units.as_slice()?, sums.as_slice()?);
-    let rows = cells.iter().zip(units).zip(sums).map(|((c, u), s)| (*c, *u, *s));
-    Ok(rows.collect())
+fn units((cells, units, sums, fluxes): &UnitRows<'_>) -> PyResult<Vec<Contribution>> {
+    let (cells, units) = (cells.as_slice()?, units.as_slice()?);
+    let amounts = sums.as_slice()?.iter().zip(fluxes.as_slice()?);
+    let rows = cells.iter().zip(units).zip(amounts);
+    Ok(rows
+        .map(|((cell, unit), (amount, flux))| Contribution {
+            cell: *cell,
+            unit: *unit,
+            amount: *amount,
+            flux: *flux,
+        })
+        .collect())
 }

@@ -21,7 +21,7 @@ use etendue_trace::reverse::method::{LeftOut, Method, Pixel};
 use etendue_trace::reverse::render::render;
 use etendue_trace::tallies::{Tally, TraceSums};
 use etendue_trace::work_unit::work_unit_of;
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -56,11 +56,12 @@ fn ledger_dict<'py>(py: Python<'py>, ledger: &Ledger) -> PyResult<Bound<'py, PyD
     Ok(dict)
 }
 
-/// Σ w, Σ w² and number of rays of each cell.
+/// Σ w, Σ w², number of rays and Σ w v of each cell.
 pub type CellArrays<'py> = (
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<u64>>,
+    Bound<'py, PyArray1<f64>>,
 );
 
 pub fn cell_arrays<'a, 'py>(
@@ -70,22 +71,25 @@ pub fn cell_arrays<'a, 'py>(
     (
         PyArray1::from_iter(py, cells.clone().map(|c| c.sum)),
         PyArray1::from_iter(py, cells.clone().map(|c| c.squares)),
-        PyArray1::from_iter(py, cells.map(|c| c.rays)),
+        PyArray1::from_iter(py, cells.clone().map(|c| c.rays)),
+        PyArray1::from_iter(py, cells.map(|c| c.products)),
     )
 }
 
-/// Cell, unit and sum of each unit of rays with copies, in the order of cells and units.
+/// Cell, unit, sum and flux of each unit of rays with copies, in the order of cells and units.
 pub type UnitArrays<'py> = (
     Bound<'py, PyArray1<u32>>,
     Bound<'py, PyArray1<u64>>,
+    Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<f64>>,
 );
 
 pub fn unit_arrays<'py>(py: Python<'py>, units: &[Contribution]) -> UnitArrays<'py> {
     (
-        PyArray1::from_iter(py, units.iter().map(|unit| unit.0)),
-        PyArray1::from_iter(py, units.iter().map(|unit| unit.1)),
-        PyArray1::from_iter(py, units.iter().map(|unit| unit.2)),
+        PyArray1::from_iter(py, units.iter().map(|of| of.cell)),
+        PyArray1::from_iter(py, units.iter().map(|of| of.unit)),
+        PyArray1::from_iter(py, units.iter().map(|of| of.amount)),
+        PyArray1::from_iter(py, units.iter().map(|of| of.flux)),
     )
 }
 
@@ -377,25 +381,27 @@ pub fn deepest() -> u32 {
     DEEPEST
 }
 
-/// The light image of stored scatter events, as (Σ w, Σ w², rays) of each pixel.
+/// The light image of stored scatter events, whose rays bring such fluxes, as (Σ w, Σ w², rays, Σ w v) of each pixel.
 #[pyfunction]
-#[pyo3(signature = (scene, events, view, threads=None))]
+#[pyo3(signature = (scene, events, brought, view, threads=None))]
 pub fn look_at_events<'py>(
     py: Python<'py>,
     scene: &Scene,
     events: PyReadonlyArray2<'py, u64>,
+    brought: PyReadonlyArray1<'py, f64>,
     view: View,
     threads: Option<usize>,
 ) -> PyResult<CellArrays<'py>> {
-    if events.shape()[1] != WORDS {
+    if events.shape()[1] != WORDS || brought.len() != events.shape()[0] {
         return Err(PyValueError::new_err(format!(
-            "events of shape (n, {WORDS}) are needed"
+            "events of shape (n, {WORDS}), and n fluxes, are needed"
         )));
     }
-    let (core, view, rows) = (scene.core(), view.core(), events.as_slice()?);
+    let (core, view) = (scene.core(), view.core());
+    let (rows, brought) = (events.as_slice()?, brought.as_slice()?);
     let cells = stoppable(py, |stop| {
         inside(threads.unwrap_or(0), || {
-            camera_connection::look_at_events(core, rows, &view, Some(stop))
+            camera_connection::look_at_events(core, rows, brought, &view, Some(stop))
         })
     })?;
     let cells = cells.ok_or_else(|| PyValueError::new_err("the events are of another scene"))?;

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::events::{ScatterEvent, WORDS, from_row, ray_of};
 use crate::medium_cache::MediumCache;
 use crate::mis::density;
-use crate::records::Cell;
+use crate::records::{Cell, Contribution, merge};
 use crate::scatter::Surface;
 use crate::scene::{Act, Scene};
 use crate::solid_stack::SolidStack;
@@ -111,26 +111,30 @@ const BLOCK: usize = 1024;
 /// The light image of stored events (see [`crate::events`]), on the threads of the current pool; the same bits for any number
 /// of them. None if they are not of this scene.
 ///
-/// The rows of a ray follow each other: its contributions to a pixel are taken together. Once `stop` is set, the rest is left
-/// out.
+/// The rows of a ray follow each other: its contributions to a pixel are taken together. `brought` is the flux that the ray of
+/// each row, or the unit with all its copies, brings. Once `stop` is set, the rest is left out.
 #[must_use]
-pub fn look_at_events(scene: &Scene, rows: &[u64], view: &View, stop: Option<&AtomicBool>) -> Option<Vec<Cell>> {
-    let parts: Vec<Option<Vec<(u32, f64)>>> = stretches(rows)
+pub fn look_at_events(
+    scene: &Scene,
+    rows: &[u64],
+    brought: &[f64],
+    view: &View,
+    stop: Option<&AtomicBool>,
+) -> Option<Vec<Cell>> {
+    let parts: Vec<Option<Vec<Contribution>>> = stretches(rows)
         .into_par_iter()
         .map(|range| {
             if stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
                 return Some(Vec::new());
             }
-            EventImage::new(scene, view).look(&rows[range])
+            let of_rows = &brought[range.start / WORDS..range.end / WORDS];
+            EventImage::new(scene, view).look(&rows[range], of_rows)
         })
         .collect();
     let mut cells = vec![Cell::default(); view.pixels()];
     for part in parts {
-        for (pixel, light) in part? {
-            let cell = &mut cells[pixel as usize];
-            cell.sum += light;
-            cell.squares += light * light;
-            cell.rays += 1;
+        for contribution in part? {
+            cells[contribution.cell as usize].add(&contribution);
         }
     }
     Some(cells)
@@ -158,11 +162,11 @@ struct EventImage<'a> {
     view: &'a View,
     media: MediumCache,
     /// Events of a block that the observer would see if nothing were in between, and the lines to the observer.
-    events: Vec<(ScatterEvent, Sight)>,
+    events: Vec<(ScatterEvent, Sight, f64)>,
     lines: RayBlock,
     hits: Hits,
-    /// What the observer sees: ray, pixel, luminance.
-    seen: Vec<(u64, u32, f64)>,
+    /// What the observer sees: luminance of pixels.
+    seen: Vec<Contribution>,
 }
 
 impl<'a> EventImage<'a> {
@@ -178,41 +182,43 @@ impl<'a> EventImage<'a> {
         }
     }
 
-    /// Pixels and what each ray adds to them.
-    fn look(mut self, rows: &[u64]) -> Option<Vec<(u32, f64)>> {
-        for row in rows.chunks_exact(WORDS) {
+    /// What each ray adds to pixels.
+    fn look(mut self, rows: &[u64], brought: &[f64]) -> Option<Vec<Contribution>> {
+        for (row, flux) in rows.chunks_exact(WORDS).zip(brought) {
             let event = from_row(self.scene, row)?;
             if let Some(sight) = sight(&event, self.scene, self.view, &mut self.media) {
                 self.lines.push(event.point, sight.k, event.origin_faces);
-                self.events.push((event, sight));
+                self.events.push((event, sight, *flux));
                 if self.events.len() == BLOCK {
                     self.follow();
                 }
             }
         }
         self.follow();
-        let mut result = Vec::with_capacity(self.seen.len());
-        for same in self.seen.chunk_by_mut(|a, b| a.0 == b.0) {
-            // What one ray adds to one pixel belongs together: it is not independent.
-            same.sort_by_key(|(_, pixel, _)| *pixel);
-            for here in same.chunk_by(|a, b| a.1 == b.1) {
-                result.push((here[0].1, here.iter().map(|(_, _, light)| light).sum()));
-            }
+        for same in self.seen.chunk_by_mut(|a, b| a.unit == b.unit) {
+            same.sort_by_key(|light| light.cell);
         }
-        Some(result)
+        // What one ray adds to one pixel belongs together: it is not independent.
+        merge(&mut self.seen);
+        Some(self.seen)
     }
 
     /// Follows the lines of the block to the observer.
     fn follow(&mut self) {
         let (scene, view) = (self.scene, self.view);
         scene.face_set.nearest(&self.lines, &mut self.hits);
-        for (i, (event, sight)) in self.events.iter().enumerate() {
+        for (i, (event, sight, flux)) in self.events.iter().enumerate() {
             let share = match self.at_once(i, event, sight) {
                 Some(share) => share,
                 None => passes(event, scene, view, sight, &mut self.media),
             };
             if share > 0.0 {
-                self.seen.push((event.ray, sight.pixel, sight.light * share));
+                self.seen.push(Contribution {
+                    cell: sight.pixel,
+                    unit: event.ray,
+                    amount: sight.light * share,
+                    flux: *flux,
+                });
             }
         }
         self.events.clear();

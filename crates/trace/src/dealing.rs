@@ -11,6 +11,7 @@ use etendue_geometry::RaySource;
 use etendue_optics::source::Emitter;
 use etendue_sampling::ordered::BATCH;
 
+use crate::records::Contribution;
 use crate::scene::Scene;
 
 /// More rays than a run has: longer sets are never given out twice by one source.
@@ -23,6 +24,8 @@ pub struct Dealing {
     rays: u64,
     /// Of a batch.
     each: u64,
+    /// Of the sources.
+    fluxes: Vec<f64>,
     /// Sums of the sources' shares of the flux.
     shares: Vec<f64>,
     /// Rays of each source in the whole run.
@@ -47,6 +50,7 @@ impl Dealing {
         let mut dealing = Self {
             rays,
             each: BATCH,
+            fluxes: fluxes.to_vec(),
             shares,
             counts: Vec::new(),
             stratum: vec![0; fluxes.len()],
@@ -172,21 +176,57 @@ impl Dealing {
         first + (u128::from(i) * u128::from(length) / u128::from(self.counts[source])) as u64
     }
 
-    /// The units of rays of one batch, by their numbers in the run.
-    pub fn units<'a>(&self, batch: u64, rays: impl Iterator<Item = &'a mut u64>) {
-        if self.strata() == 1 {
-            return;
-        }
+    /// Rays of a source that gives out a set with copies which are that unit.
+    #[allow(clippy::cast_possible_truncation, reason = "a source has no more rays than the run")]
+    fn copies(&self, source: usize, unit: u64) -> u64 {
+        let first = self.units[self.stratum[source]];
+        let length = u128::from(self.units[self.stratum[source] + 1] - first);
+        let before = |unit: u64| (u128::from(unit) * u128::from(self.counts[source])).div_ceil(length);
+        (before(unit - first + 1) - before(unit - first)) as u64
+    }
+
+    /// What a unit brings in the whole run, of which a ray of that source has this flux: a source's rays carry its share of
+    /// what the set says of them.
+    fn whole(&self, source: usize, unit: u64, flux: f64) -> f64 {
+        let each = |source: usize| self.fluxes[source] / self.counts[source] as f64;
+        let own = each(source);
+        let sharing = (0..self.sources()).filter(|s| self.stratum[*s] == self.stratum[source] && self.counts[*s] > 0);
+        let part = |s: usize| self.copies(s, unit) as f64 * if s == source { 1.0 } else { each(s) / own };
+        flux * sharing.map(part).sum::<f64>()
+    }
+
+    /// Of the rays of a batch, by their numbers in the run: the source and the unit of those with copies.
+    fn copied(&self, batch: u64) -> impl Fn(u64) -> Option<(usize, u64)> {
         let ranges = self.batch(batch);
         let mut firsts = vec![self.first(batch)];
         firsts.extend(ranges.iter().scan(self.first(batch), |first, range| {
             *first += range.end - range.start;
             Some(*first)
         }));
-        for ray in rays {
-            let source = firsts.partition_point(|first| first <= ray) - 1;
-            if self.stratum.get(source).is_some_and(|stratum| *stratum > 0) {
-                *ray = self.unit(source, ranges[source].start + (*ray - firsts[source]));
+        move |ray| {
+            let source = firsts.partition_point(|first| *first <= ray) - 1;
+            let copied = self.stratum.get(source).is_some_and(|stratum| *stratum > 0);
+            copied.then(|| (source, self.unit(source, ranges[source].start + (ray - firsts[source]))))
+        }
+    }
+
+    /// Of rays of one batch, by their numbers in the run: their units, and what these bring in the whole run over the flux of
+    /// the ray.
+    pub fn units(&self, batch: u64, rays: impl Iterator<Item = u64>) -> Vec<(u64, f64)> {
+        let copied = self.copied(batch);
+        let of = |ray| copied(ray).map_or((ray, 1.0), |(source, unit)| (unit, self.whole(source, unit, 1.0)));
+        rays.map(of).collect()
+    }
+
+    /// The contributions of rays of one batch as those of units.
+    pub fn by_units<'a>(&self, batch: u64, contributions: impl Iterator<Item = &'a mut Contribution>) {
+        if self.strata() > 1 {
+            let copied = self.copied(batch);
+            for of_ray in contributions {
+                if let Some((source, unit)) = copied(of_ray.unit) {
+                    of_ray.unit = unit;
+                    of_ray.flux = self.whole(source, unit, of_ray.flux);
+                }
             }
         }
     }
@@ -275,9 +315,8 @@ mod tests {
         let (mut met, mut all) = (BTreeSet::new(), 0);
         for batch in 0..6 {
             let (from, to) = (batch * BATCH, ((batch + 1) * BATCH).min(dealing.rays));
-            let mut units: Vec<u64> = (from..to).collect();
+            let units: Vec<u64> = dealing.units(batch, from..to).iter().map(|of| of.0).collect();
             let ahead = dealing.ahead(from);
-            dealing.units(batch, units.iter_mut());
             all += units.len() as u64;
             assert!(units.iter().all(|u| *u >= ahead[dealing.stratum(*u)]));
             met.extend(units.iter().filter(|u| dealing.stratum(**u) > 0).copied());
@@ -323,9 +362,7 @@ mod tests {
         let dealing = Dealing::new(&[1.0, 1.0], &[Some((0, 1 << 20)), Some((0, 1 << 20))], 2 * BATCH);
         assert_eq!(dealing.strata(), 2);
         assert_eq!(dealing.done(2 * BATCH), [0, BATCH]);
-        let mut units: Vec<u64> = (0..BATCH).collect();
-        dealing.units(0, units.iter_mut());
-        let distinct: BTreeSet<u64> = units.into_iter().collect();
+        let distinct: BTreeSet<u64> = dealing.units(0, 0..BATCH).iter().map(|of| of.0).collect();
         assert_eq!(distinct.len() as u64, BATCH / 2);
     }
 }

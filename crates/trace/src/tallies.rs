@@ -5,7 +5,7 @@ use crate::detector::{Detector, Recorded};
 use crate::events::EventReservoir;
 use crate::guide::Arrival;
 use crate::ledger::Ledger;
-use crate::records::{Cell, CollectedRay, Contribution};
+use crate::records::{Cell, CollectedRay, Contribution, merge};
 use crate::scene::Scene;
 
 /// Sums of cells over the batches of a work unit.
@@ -27,35 +27,30 @@ impl Tally {
         }
     }
 
-    /// Adds the contributions of a batch. Those of one ray to one cell belong together: they are not independent.
-    pub fn add(&mut self, contributions: Vec<Contribution>, dealing: &Dealing) {
-        let contributions = in_order(contributions, self.cells.len());
-        for same in contributions.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-            let (number, unit, _) = same[0];
-            let sum: f64 = same.iter().map(|(_, _, w)| w).sum();
-            if dealing.stratum(unit) > 0 {
-                self.copies.push((number, unit, sum));
-                continue;
+    /// Adds the contributions of a batch, [`brought_together`].
+    pub fn add(&mut self, contributions: &[Contribution], dealing: &Dealing) {
+        for contribution in contributions {
+            if dealing.stratum(contribution.unit) > 0 {
+                self.copies.push(*contribution);
+            } else {
+                self.cells[contribution.cell as usize].add(contribution);
             }
-            let cell = &mut self.cells[number as usize];
-            cell.sum += sum;
-            cell.squares += sum * sum;
-            cell.rays += 1;
         }
     }
 
     /// Brings what batches have of the same unit together, when all of them are added.
     fn settle(&mut self) {
         // Stable: sums are formed in the order of the batches.
-        self.copies.sort_by_key(|(cell, unit, _)| (*cell, *unit));
-        self.copies.dedup_by(|next, first| {
-            let same = (next.0, next.1) == (first.0, first.1);
-            if same {
-                first.2 += next.2;
-            }
-            same
-        });
+        self.copies.sort_by_key(Contribution::place);
+        merge(&mut self.copies);
     }
+}
+
+/// Contributions to so many cells in the order of cells and units, one of each unit to a cell: those of one ray, and of its
+/// copies, are not independent.
+pub fn brought_together(contributions: &mut Vec<Contribution>, cells: usize) {
+    *contributions = in_order(std::mem::take(contributions), cells);
+    merge(contributions);
 }
 
 /// Bits of a cell's number that contributions are dealt out by at once.
@@ -63,12 +58,11 @@ const DIGIT: u32 = 11;
 
 /// Contributions to so many cells in the order of cells and units; those of the same cell and unit stay in theirs.
 fn in_order(mut contributions: Vec<Contribution>, cells: usize) -> Vec<Contribution> {
-    let key = |(cell, unit, _): &Contribution| (*cell, *unit);
     let bits = cells.max(2).next_power_of_two().ilog2();
     let passes = bits.div_ceil(DIGIT);
     let digit = bits.div_ceil(passes);
     if contributions.len() < 1 << digit {
-        contributions.sort_by_key(key);
+        contributions.sort_by_key(Contribution::place);
         return contributions;
     }
     // By the cells digit by digit, the last one first: few of one cell are left to be sorted by their units.
@@ -77,22 +71,22 @@ fn in_order(mut contributions: Vec<Contribution>, cells: usize) -> Vec<Contribut
     for pass in 0..passes {
         let digit_of = |cell: u32| (cell >> (pass * digit)) as usize & ((1 << digit) - 1);
         places.fill(0);
-        for (cell, ..) in &contributions {
-            places[digit_of(*cell)] += 1;
+        for contribution in &contributions {
+            places[digit_of(contribution.cell)] += 1;
         }
         let mut before = 0;
         for place in &mut places {
             before += std::mem::replace(place, before);
         }
         for contribution in &contributions {
-            let place = &mut places[digit_of(contribution.0)];
+            let place = &mut places[digit_of(contribution.cell)];
             dealt[*place] = *contribution;
             *place += 1;
         }
         std::mem::swap(&mut contributions, &mut dealt);
     }
-    for of_cell in contributions.chunk_by_mut(|a, b| a.0 == b.0) {
-        of_cell.sort_by_key(key);
+    for of_cell in contributions.chunk_by_mut(|a, b| a.cell == b.cell) {
+        of_cell.sort_by_key(Contribution::place);
     }
     contributions
 }
@@ -115,37 +109,45 @@ pub fn join(dealing: &Dealing, open: &[Contribution], copies: &[Contribution], d
     let ahead = dealing.ahead(done);
     let mut joined = Joined::default();
     let mut keep = |unit: Contribution, stratum: usize| {
-        if ahead.get(stratum).is_some_and(|first| unit.1 >= *first) {
+        if ahead.get(stratum).is_some_and(|first| unit.unit >= *first) {
             joined.open.push(unit);
         }
     };
     let mut earlier = open.iter().peekable();
-    for &(number, unit, sum) in copies {
+    for &grown in copies {
         let mut held = None;
-        while let Some(other) = earlier.next_if(|other| (other.0, other.1) <= (number, unit)) {
-            if (other.0, other.1) == (number, unit) {
-                held = Some(other.2);
+        while let Some(other) = earlier.next_if(|other| other.place() <= grown.place()) {
+            if other.place() == grown.place() {
+                held = Some(other.amount);
             } else {
-                keep(*other, dealing.stratum(other.1));
+                keep(*other, dealing.stratum(other.unit));
             }
         }
-        let (stratum, before) = (dealing.stratum(unit), held.unwrap_or(0.0));
-        keep((number, unit, before + sum), stratum);
+        let (stratum, before) = (dealing.stratum(grown.unit), held.unwrap_or(0.0));
+        let (cell, sum) = (grown.cell, grown.amount);
+        keep(
+            Contribution {
+                amount: before + sum,
+                ..grown
+            },
+            stratum,
+        );
         if joined
             .cells
             .last()
-            .is_none_or(|last| (last.0, last.1) != (number, stratum))
+            .is_none_or(|last| (last.0, last.1) != (cell, stratum))
         {
-            joined.cells.push((number, stratum, Cell::default()));
+            joined.cells.push((cell, stratum, Cell::default()));
         }
         if let Some((_, _, cell)) = joined.cells.last_mut() {
             cell.sum += sum;
             cell.squares += sum * (2.0 * before + sum);
+            cell.products += sum * grown.flux;
             cell.rays += u64::from(held.is_none());
         }
     }
     for other in earlier {
-        keep(*other, dealing.stratum(other.1));
+        keep(*other, dealing.stratum(other.unit));
     }
     joined
 }
@@ -235,7 +237,7 @@ impl TraceSums {
         self.rays += emitted.rays;
         self.ledger.merge(&part.ledger);
         for (number, recorded) in part.detectors.into_iter().enumerate() {
-            self.tallies[number].add(recorded.contributions, dealing);
+            self.tallies[number].add(&recorded.contributions, dealing);
             self.events[number].add(recorded.events);
             self.records[number].extend(recorded.rays);
             self.arrivals.extend(recorded.arrivals);
@@ -243,9 +245,10 @@ impl TraceSums {
         for (cell, own) in self.emitted.cells.iter_mut().zip(part.own) {
             cell.sum += own.sum;
             cell.squares += own.squares;
+            cell.products += own.products;
             cell.rays += own.rays;
         }
-        self.emitted.add(part.copies, dealing);
+        self.emitted.add(&part.copies, dealing);
     }
 }
 
@@ -258,6 +261,15 @@ mod tests {
 
     use super::*;
 
+    fn contribution(cell: u32, unit: u64, amount: f64) -> Contribution {
+        Contribution {
+            cell,
+            unit,
+            amount,
+            flux: 1.0,
+        }
+    }
+
     #[test]
     fn contributions_come_in_the_order_of_cells_and_units_and_stay_in_their_own() {
         let stream = Stream::new(7, 2);
@@ -265,54 +277,84 @@ mod tests {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small numbers")]
             let of = |i: u64| {
                 let [a, b, ..] = stream.uniforms(i, 0);
-                ((a * a * f64::from(cells)) as u32, (b * 50.0) as u64, i as f64)
+                contribution((a * a * f64::from(cells)) as u32, (b * 50.0) as u64, i as f64)
             };
             let made: Vec<Contribution> = (0..number).map(of).collect();
             let mut expected = made.clone();
-            expected.sort_by_key(|(cell, unit, _)| (*cell, *unit));
+            expected.sort_by_key(Contribution::place);
             assert_eq!(in_order(made, cells as usize), expected);
         }
     }
 
-    /// However a run is cut into work units: Σ w² is that of whole units, and none is open at the end.
+    /// However a run is cut into work units: Σ w² is that of whole units, Σ w v of what they bring in the whole run, and none
+    /// is open at the end.
     #[test]
     fn copies_that_go_on_from_one_work_unit_to_the_next_are_one_contribution() {
         let rays = 5 * BATCH + 1234;
         // A lamp of its own, a set of 1000 rays given out many times, one of 7 that two sources share.
-        let sets = [None, Some((0, 1000)), Some((1, 7)), Some((1, 7))];
-        let dealing = Dealing::new(&[0.3, 1.7, 0.05, 0.11], &sets, rays);
+        let (fluxes, sets) = (
+            [0.3, 1.7, 0.05, 0.11],
+            [None, Some((0, 1000)), Some((1, 7)), Some((1, 7))],
+        );
+        let dealing = Dealing::new(&fluxes, &sets, rays);
         let stream = Stream::new(5, 1);
+        // Flux of the record that a ray of a source is of, over what the source says of all of them.
+        let record = |unit: u64| (unit % 5 + 1) as f64;
+        let ray = |batch: u64, number: u64| {
+            let unit = dealing.units(batch, std::iter::once(number))[0].0;
+            let (mut before, mut source) = (dealing.first(batch), 0);
+            for (s, range) in dealing.batch(batch).iter().enumerate() {
+                source = if number >= before && range.start < range.end {
+                    s
+                } else {
+                    source
+                };
+                before += range.end - range.start;
+            }
+            (
+                source,
+                unit,
+                record(unit) * fluxes[source] / dealing.count(source) as f64,
+            )
+        };
         let contributions = |batch: u64| -> Vec<Contribution> {
             let numbers = batch * BATCH..((batch + 1) * BATCH).min(rays);
             let mut list: Vec<Contribution> = numbers
                 .filter(|ray| stream.word(*ray).is_multiple_of(4))
-                .map(|ray| {
-                    (
-                        u32::from(stream.word(ray).to_le_bytes()[1] % 3),
-                        ray,
-                        (stream.word(ray) >> 40) as f64,
-                    )
+                .map(|number| Contribution {
+                    cell: u32::from(stream.word(number).to_le_bytes()[1] % 3),
+                    unit: number,
+                    amount: (stream.word(number) >> 40) as f64,
+                    flux: ray(batch, number).2,
                 })
                 .collect();
-            dealing.units(batch, list.iter_mut().map(|(_, ray, _)| ray));
+            dealing.by_units(batch, list.iter_mut());
+            brought_together(&mut list, 3);
             list
         };
         let mut whole: BTreeMap<(u32, u64), f64> = BTreeMap::new();
-        for (cell, unit, w) in (0..6).flat_map(contributions) {
-            *whole.entry((cell, unit)).or_default() += w;
+        for of_unit in (0..6).flat_map(contributions) {
+            *whole.entry(of_unit.place()).or_default() += of_unit.amount;
+        }
+        let mut brought: BTreeMap<u64, f64> = BTreeMap::new();
+        for number in 0..rays {
+            let (_, unit, flux) = ray(number / BATCH, number);
+            *brought.entry(unit).or_default() += flux;
         }
         let mut expected = vec![Cell::default(); 9];
         for ((cell, unit), w) in whole {
-            let held = &mut expected[dealing.stratum(unit) * 3 + cell as usize];
-            held.sum += w;
-            held.squares += w * w;
-            held.rays += 1;
+            expected[dealing.stratum(unit) * 3 + cell as usize].add(&Contribution {
+                cell,
+                unit,
+                amount: w,
+                flux: brought[&unit],
+            });
         }
         for cuts in [&[0, 6][..], &[0, 1, 2, 3, 4, 5, 6], &[0, 2, 5, 6]] {
             let (mut found, mut open) = (vec![Cell::default(); 9], Vec::new());
             for pair in cuts.windows(2) {
                 let mut tally = Tally::new(3);
-                (pair[0]..pair[1]).for_each(|batch| tally.add(contributions(batch), &dealing));
+                (pair[0]..pair[1]).for_each(|batch| tally.add(&contributions(batch), &dealing));
                 tally.settle();
                 let joined = join(&dealing, &open, &tally.copies, (pair[1] * BATCH).min(rays));
                 open = joined.open;
@@ -324,6 +366,7 @@ mod tests {
                 for (place, sums) in own.chain(copied) {
                     found[place].sum += sums.sum;
                     found[place].squares += sums.squares;
+                    found[place].products += sums.products;
                     found[place].rays += sums.rays;
                 }
                 assert_eq!(open.is_empty(), pair[1] == 6);
@@ -333,6 +376,7 @@ mod tests {
                 // Whole numbers below 2⁵³ add up exactly; their squares do not.
                 assert_eq!(found.sum, expected.sum);
                 assert!((found.squares / expected.squares - 1.0).abs() < 1e-12);
+                assert!((found.products / expected.products - 1.0).abs() < 1e-10);
             }
         }
     }

@@ -244,16 +244,18 @@ fn events_looked_at_later_are_the_light_image() {
     assert!(rows.len() > 30_000 && sums.events[1].level() == 0);
     assert!(rows.windows(2).all(|two| ray_of(&two[0]) <= ray_of(&two[1])));
     let flat: Vec<u64> = rows.iter().flatten().copied().collect();
-    let later = look_at_events(&scene.0, &flat, &VIEW, None).expect("of this scene");
+    let brought: Vec<f64> = rows.iter().map(|row| f64::from_bits(row[6])).collect();
+    let later = look_at_events(&scene.0, &flat, &brought, &VIEW, None).expect("of this scene");
     let lit = later.iter().filter(|cell| cell.rays > 0).count();
     assert!(lit > 20, "{lit}");
     for (a, b) in later.iter().zip(&sums.tallies[0].cells) {
         assert_eq!(a.rays, b.rays);
         assert!((a.sum - b.sum).abs() <= 1e-12 * b.sum && (a.squares - b.squares).abs() <= 1e-12 * b.squares);
+        assert!((a.products - b.products).abs() <= 1e-12 * b.products);
     }
     for threads in [1, 7] {
         assert_eq!(
-            inside(threads, || look_at_events(&scene.0, &flat, &VIEW, None)),
+            inside(threads, || look_at_events(&scene.0, &flat, &brought, &VIEW, None)),
             Some(later.clone())
         );
     }
@@ -261,7 +263,7 @@ fn events_looked_at_later_are_the_light_image() {
     for (word, value) in [(9, 77), (11, 1), (13, 2 << 48), (6, f64::NAN.to_bits())] {
         let mut other = flat.clone();
         other[word] = value;
-        assert_eq!(look_at_events(&scene.0, &other, &VIEW, None), None);
+        assert_eq!(look_at_events(&scene.0, &other, &brought, &VIEW, None), None);
     }
 }
 

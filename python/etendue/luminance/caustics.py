@@ -94,10 +94,17 @@ class Forward:
 
     @classmethod
     def of(
-        cls, sums: CellSums, shape: tuple[int, ...], dealing: Dealing, rays: int, scale: float, note: str
+        cls,
+        sums: CellSums,
+        sources: CellSums,
+        shape: tuple[int, ...],
+        dealing: Dealing,
+        rays: int,
+        scale: float,
+        note: str,
     ) -> Forward:
-        """From the sums of each pixel over the first `rays` rays of a run; each w stands for `scale` w."""
-        error = np.sqrt(dealing.variance(sums, rays)).reshape(shape)
+        """From the sums of each pixel, and of the sources, over the first `rays` rays of a run; w stands for `scale` w."""
+        error = np.sqrt(dealing.variance(sums, rays, sources)).reshape(shape)
         sum_, count = (row.sum(axis=0).reshape(shape) for row in (sums[0], sums[2]))
         return cls(sum_ * scale, error * scale, count.astype(np.int64), note)
 
@@ -207,7 +214,7 @@ def plan(
     each, events = (SMALL_BATCH, min(FEW_EVENTS, most_events)) if long else (BATCH, most_events)
     bound = min(MOST_SEGMENTS, MOST_SHARE * LINE * lines * pixels) if long else MOST_SEGMENTS
     batches, segments, arrivals = 0, 0, []
-    sums = [np.zeros((3, view["columns"] * view["rows"])) for view in views]
+    sums = [np.zeros((4, view["columns"] * view["rows"])) for view in views]
     while batches * each < MOST_RAYS and segments < bound:
         traced = _core.work_unit(core, RUN, seed, events, batches, batches + STEP, threads, each)
         cells = (dealing.added(*dealing.nothing(tally), tally, RUN)[0] for tally in traced["tallies"])
@@ -303,12 +310,14 @@ class LightImages:
             for first in range(0, batches, ROUND):
                 last = min(first + ROUND, batches)
                 traced = _core.work_unit(self._core, rays, own, most_events, first, last, threads)
-                sums = sums or [self._dealing.nothing(tally) for tally in traced["tallies"]]
+                tallies = (*traced["tallies"], traced["emitted"])
+                sums = sums or [self._dealing.nothing(tally) for tally in tallies]
                 done = min(last * _core.batch_size(), rays)
-                before = zip(sums, traced["tallies"], strict=True)
+                before = zip(sums, tallies, strict=True)
                 sums = [self._dealing.added(*held, tally, done) for held, tally in before]
-            for total, (found, _) in zip(self._sums, sums, strict=True):
-                image = Forward.of(found, total.shape[1:], self._dealing, rays, 1.0, "")
+            *images, (sources, _) = sums
+            for total, (found, _) in zip(self._sums, images, strict=True):
+                image = Forward.of(found, sources, total.shape[1:], self._dealing, rays, 1.0, "")
                 np.add(total, [image.values, image.error**2, image.rays], out=total)
             self.runs += 1
 

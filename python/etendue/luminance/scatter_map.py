@@ -53,10 +53,10 @@ def look_at_events(
     core, seen, done = events.core, [], 0
     for view in views:
         width = events.dealing.strata, view["columns"] * view["rows"]
-        sums = np.zeros(width), np.zeros(width), np.zeros(width, np.uint64)
-        for stratum, words in _stretches(events):
+        sums = np.zeros(width), np.zeros(width), np.zeros(width, np.uint64), np.zeros(width)
+        for stratum, words, brought in _stretches(events):
             try:
-                found = _core.look_at_events(core, words, view, threads)
+                found = _core.look_at_events(core, words, brought, view, threads)
             except ValueError as error:
                 raise ArgumentError(f"the scatter events of {events.name!r}: {error}.") from error
             for total, part in zip(sums, found, strict=True):
@@ -66,7 +66,7 @@ def look_at_events(
                 progress(done)
         shape = (view["rows"], view["columns"])
         note = f"{len(events):,} scatter events of {events.rays:,} rays, for light that comes from diffuse surfaces directly"
-        seen.append(Forward.of(sums, shape, events.dealing, events.rays, events.scale, note))
+        seen.append(Forward.of(sums, events.emitted, shape, events.dealing, events.rays, events.scale, note))
     if how is not None and events.scene is not None:
         maps = look_at_scene(events.scene, pairs, how, progress, seen, cache=cache, threads=threads)
         return [lmap.replace(notes=(*lmap.notes, *events.notes)) for lmap in maps]
@@ -94,14 +94,16 @@ def _map(events: ScatterEvents, image: Forward, observer: Observer, screen: Scre
     )
 
 
-def _stretches(events: ScatterEvents) -> Iterator[tuple[int, npt.NDArray[np.uint64]]]:
-    """The events as words, some at a time, with their stratum; those of a ray and of all its copies stay together."""
+def _stretches(events: ScatterEvents) -> Iterator[tuple[int, npt.NDArray[np.uint64], npt.NDArray[np.float64]]]:
+    """The events as words, some at a time, with their stratum, and the flux of the ray of each with all its copies, which stay
+    together.
+    """
     rows, dealing = events.rows, events.dealing
     ray = rows["ray"] & RAY
     if dealing.strata == 1:
-        yield from ((0, _words(rows[part])) for part in _cuts(ray))
+        yield from ((0, _words(rows[part]), rows["flux"][part].copy()) for part in _cuts(ray))
         return
-    unit, stratum = dealing.core.units(ray)
+    unit, stratum, share = dealing.core.units(ray)
     order = np.argsort(unit, kind="stable")
     for number in range(dealing.strata):
         own = order[stratum[order] == number]
@@ -109,7 +111,7 @@ def _stretches(events: ScatterEvents) -> Iterator[tuple[int, npt.NDArray[np.uint
             chosen = rows[own[part]]
             # To the core, copies of a ray are that ray.
             chosen["ray"] = unit[own[part]]
-            yield number, _words(chosen)
+            yield number, _words(chosen), chosen["flux"] * share[own[part]]
 
 
 def _cuts(keys: npt.NDArray[np.uint64]) -> Iterator[slice]:

@@ -14,15 +14,14 @@ from etendue import _core
 
 Array = npt.NDArray[np.float64]
 Counts = npt.NDArray[np.uint64]
-CellSums = tuple[Array, Array, Counts]
-"""Σ w, Σ w² and number of units of each cell, shape (strata, cells)."""
+CellSums = tuple[Array, Array, Counts, Array]
+"""Σ w, Σ w², number of units, and Σ w v with v their flux, of each cell, shape (strata, cells)."""
 
+Units = tuple[npt.NDArray[np.uint32], Counts, Array, Array]
+"""Rays with copies: cell, unit, Σ w and flux in the whole run, in the order of cells and units."""
 
-Units = tuple[npt.NDArray[np.uint32], Counts, Array]
-"""Rays with copies: cell, unit and Σ w, in the order of cells and units."""
-
-Tally = tuple[tuple[Array, Array, Counts], Units]
-"""Of a work unit: Σ w, Σ w² and number of the rays without copies, shape (cells,), and what those with copies add."""
+Tally = tuple[CellSums, Units]
+"""Of a work unit: sums of the rays without copies, shape (cells,), and what those with copies add."""
 
 ROUNDED = 12.0 * 2.0**-53
 """Sums of n terms are off by up to n/2⁵³ of themselves [Higham2002]_, and variances are made of up to twelve such."""
@@ -103,18 +102,18 @@ class Dealing:
     def nothing(self, tally: Tally) -> tuple[CellSums, Units]:
         """Sums of as many cells as a tally has, before anything is added, and no open units."""
         shape = self.strata, len(tally[0][0])
-        none = np.zeros(0, np.uint32), np.zeros(0, np.uint64), np.zeros(0)
-        return (np.zeros(shape), np.zeros(shape), np.zeros(shape, np.uint64)), none
+        none = np.zeros(0, np.uint32), np.zeros(0, np.uint64), np.zeros(0), np.zeros(0)
+        return (np.zeros(shape), np.zeros(shape), np.zeros(shape, np.uint64), np.zeros(shape)), none
 
     def added(self, sums: CellSums, begun: Units, tally: Tally, rays: int) -> tuple[CellSums, Units]:
         """Sums with those of the next work unit.
 
         Parameters
         ----------
-        sums : (Σ w, Σ w², units)
+        sums : CellSums
             So far, shape (strata, cells).
-        begun : (cell, unit, Σ w)
-            Units of which more copies may come.
+        begun : Units
+            Those of which more copies may come.
         tally : Tally
             Of the work unit.
         rays : int
@@ -130,26 +129,24 @@ class Dealing:
         Three rays, each given out twice, which contribute 1 each time: two of them are done, of the third more may come.
 
         >>> dealing = Dealing((1.0,), ((0, 3),), 6)
-        >>> own = np.zeros(1), np.zeros(1), np.zeros(1, np.uint64)
-        >>> copies = np.zeros(3, np.uint32), np.arange(6, 9, dtype=np.uint64), np.array([2.0, 2.0, 1.0])
+        >>> own = np.zeros(1), np.zeros(1), np.zeros(1, np.uint64), np.zeros(1)
+        >>> copies = np.zeros(3, np.uint32), np.arange(6, 9, dtype=np.uint64), np.array([2.0, 2.0, 1.0]), np.full(3, 2.0)
         >>> sums, begun = dealing.added(*dealing.nothing((own, copies)), (own, copies), rays=5)
         >>> [part[1].tolist() for part in sums], begun[2].tolist()
-        ([[5.0], [9.0], [3]], [1.0])
+        ([[5.0], [9.0], [3], [10.0]], [1.0])
         """
         own, copies = tally
-        sum_, squares, count = sums[0].copy(), sums[1].copy(), sums[2].copy()
-        sum_[0] += own[0]
-        squares[0] += own[1]
-        count[0] += own[2]
+        added = sums[0].copy(), sums[1].copy(), sums[2].copy(), sums[3].copy()
+        for total, part in zip(added, own, strict=True):
+            np.add(total[0], part, out=total[0])
         if self.strata > 1:
             cell, stratum, grown, begun = self.core.join(begun, copies, rays)
-            # Each cell of a stratum comes once.
-            sum_[stratum, cell] += grown[0]
-            squares[stratum, cell] += grown[1]
-            count[stratum, cell] += grown[2]
-        return (sum_, squares, count), begun
+            for total, part in zip(added, grown, strict=True):
+                # Each cell of a stratum comes once.
+                total[stratum, cell] = total[stratum, cell] + part
+        return added, begun
 
-    def variance(self, cells: CellSums, rays: int, sources: CellSums | None = None) -> Array:
+    def variance(self, cells: CellSums, rays: int, sources: CellSums) -> Array:
         """Variance of Σ w of each cell over the first `rays` rays, shape (cells,).
 
         A unit adds w to a cell, mostly 0. The n units of a stratum are independent of each other and alike, so that the
@@ -158,30 +155,36 @@ class Dealing:
 
         Of units of unequal flux v, another sample would have another Σ v; but the flux of a set is stated. With p = Σ w/Σ v,
         what differs is Σ (w − p v), of the variance Σ w² − 2p Σ w v + p² Σ v² (that of a ratio, [Cochran1977]_), as far as a
-        set was given out.
+        set was given out. Of units of equal flux that is the same.
 
         Parameters
         ----------
         cells : CellSums
-            Σ w, Σ w² and number of units of each cell.
+            What each cell got.
         rays : int
             Given out.
-        sources : CellSums, optional
-            Σ v, Σ v² and number of units of the sources and of all of them, for cells which a unit brings its flux, as often
-            as it comes: w is 0, v, 2v … Then Σ w v is at most Σ w², and p Σ v² if flux and way have nothing to do with each
-            other. The lesser one is taken, so that the variance is at least what it should be. None: for cells of any other
-            kind, and of rays of equal flux the same.
+        sources : CellSums
+            What the sources, and all of them, emitted.
+
+        Examples
+        --------
+        Of five rays, two of flux 3 go to the left, three of flux 1 to the right: what is known is the difference.
+
+        >>> cells = np.array([[6.0, 3.0]]), np.array([[18.0, 3.0]]), np.array([[2, 3]], np.uint64), np.array([[18.0, 3.0]])
+        >>> emitted = np.array([[9.0, 9.0]]), np.array([[21.0, 21.0]]), np.array([[5, 5]], np.uint64), np.array([[21.0, 21.0]])
+        >>> Dealing((9.0,), ((0, 5),), 5).variance(cells, 5, emitted).round(9).tolist()
+        [3.333333333, 3.333333333]
         """
-        sum_, squares, count = cells
+        sum_, squares, count, products = cells
         units = self.done(rays).astype(np.float64)[:, None]
         variance = _cleared(squares - sum_ * sum_ / np.maximum(units, 1.0), squares, units)
-        if sources is not None:
-            emitted, square = (row[:, -1:] for row in sources[:2])
-            share = np.divide(sum_, emitted, out=np.zeros_like(sum_), where=emitted > 0.0)
-            both = np.minimum(np.minimum(squares, share * square), np.sqrt(squares * square))
-            restated = _cleared(squares - 2.0 * share * both + share * share * square, squares, units)
-            stated = self._stated(sources)[:, None]
-            variance = stated * restated + (1.0 - stated) * variance
+        emitted, square = (row[:, -1:] for row in sources[:2])
+        share = np.divide(sum_, emitted, out=np.zeros_like(sum_), where=emitted > 0.0)
+        # What the parts are rounded by is a share of the largest of them.
+        parts = np.maximum(squares, share * share * square)
+        restated = _cleared(squares - 2.0 * share * products + share * share * square, parts, units)
+        stated = self._stated(sources)[:, None]
+        variance = stated * restated + (1.0 - stated) * variance
         # Rays of their own are many; of a set of few rays the last factor matters.
         factor = np.divide(units, units - 1.0, out=np.full_like(units, np.nan), where=units > 1.0)
         factor[0] = 1.0
@@ -197,17 +200,17 @@ class Dealing:
         Parameters
         ----------
         sources : CellSums
-            Σ v, Σ v² and number of units of the sources and of all of them, shape (strata, sources + 1).
+            What the sources, and all of them, emitted, shape (strata, sources + 1).
 
         Examples
         --------
         Two of four rays that bring 1 and 3:
 
-        >>> sums = np.array([[4.0, 4.0]]), np.array([[10.0, 10.0]]), np.array([[2, 2]], np.uint64)
+        >>> sums = np.array([[4.0, 4.0]]), np.array([[10.0, 10.0]]), np.array([[2, 2]], np.uint64), np.array([[10.0, 10.0]])
         >>> Dealing((8.0,), ((0, 4),), 4).emitted_variance(sums).tolist()
         [[1.0, 1.0]]
         """
-        _, squares, count = sources
+        _, squares, count, _ = sources
         given = count.astype(np.float64)
         length = np.array([held[1] if held is not None else 0 for held in self.sets], dtype=np.float64)
         left = np.zeros_like(squares)
@@ -245,6 +248,6 @@ def _cleared(variance: Array, squares: Array, units: Array) -> Array:
 
 def _spread(sources: CellSums) -> Array:
     """Σ v² − (Σ v)²/m of what sources emitted in m units."""
-    sum_, squares, count = sources
+    sum_, squares, count, _ = sources
     units = np.maximum(count.astype(np.float64), 1.0)
     return _cleared(squares - sum_ * sum_ / units, squares, units)

@@ -16,7 +16,7 @@ from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.provenance import Provenance
 from etendue.scatter.building import core_scene
 from etendue.scene.compiling import Compiled, compile_scene
-from etendue.scene.dealing import Dealing
+from etendue.scene.dealing import CellSums, Dealing
 from etendue.scene.scene import Scene
 from etendue.units import FluxUnit
 
@@ -68,6 +68,8 @@ class ScatterEvents:
         Rays that were traced.
     dealing : Dealing
         Which source gave out which of them, and which are copies of one ray of a set.
+    emitted : CellSums
+        What the sources, and all of them, emitted.
     surface_names : tuple of str
         Of all faces of the scene.
     surfaces : tuple of str
@@ -103,6 +105,7 @@ class ScatterEvents:
     share: float
     rays: int
     dealing: Dealing
+    emitted: CellSums
     surface_names: tuple[str, ...]
     surfaces: tuple[str, ...]
     geometry: str

@@ -373,10 +373,11 @@ def _cells_error(found: IlluminanceMap, step: Step, of: str, inside: npt.NDArray
     result = step.traced
     chosen = slice(None) if inside is None else inside.ravel()
     number = [detection.name for detection in result.plan.detections].index(of)
-    sum_, squares, count = (row[:, chosen] for row in result.sums.cells[number])
+    sum_, *others = (row[:, chosen] for row in result.sums.cells[number])
     if sum_.shape[1] > 1 and found.flux > result.ledger.total.flux * (1.0 + ROUNDING):
         return math.nan
-    one = sum_.sum(axis=1, keepdims=True), squares.sum(axis=1, keepdims=True), count.sum(axis=1, keepdims=True)
+    sum_, squares, count, products = (row.sum(axis=1, keepdims=True) for row in (sum_, *others))
+    one = sum_, squares, count, products
     return float(Counted.of(one, result.plan.dealing, result.rays_done, result.sums.sources).error[0])
 
 

@@ -69,6 +69,7 @@ class DetectorSums:
             share,
             self.sums.rays,
             self.dealing,
+            self.sums.sources,
             self.plan.face_names,
             surfaces,
             geometry,

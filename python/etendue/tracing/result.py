@@ -149,7 +149,7 @@ class TraceResult(InNotebook):
 
     @cached_property
     def _effective(self) -> list[float]:
-        sum_, squares, _ = (row.sum(axis=0) for row in self.sums.sources)
+        sum_, squares, *_ = (row.sum(axis=0) for row in self.sums.sources)
         return [float(s * s / q) if q > 0.0 else 0.0 for s, q in zip(sum_, squares, strict=True)]
 
     def _copies_told(self) -> Iterator[str]:

@@ -33,8 +33,9 @@ from etendue.tracing.scattered import STRETCH, Scattered
 from etendue.tracing.sums import ENTRIES, RECORD, Collected, Sums
 from etendue.units import FLUX_UNITS
 
-VERSION = 3
-"""Far fields are shared by nodes since version 3, and copies of rays are counted together since version 2."""
+VERSION = 4
+"""What errors of unequal rays rest on is held since version 4, far fields are shared by nodes since version 3, and copies of
+rays are counted together since version 2."""
 
 CHUNK = 1 << 13
 """Rows of a chunk of rays: half a megabyte."""
@@ -45,11 +46,14 @@ IMAGE_LIMIT = 1 << 28
 NAMES = ("source_names", "face_names", "medium_names", "loss_names", "notes")
 NUMBERS = ("rays", "seed", "most_events")
 SUMS = ("batches", "rays", "segments")
-OPEN = {"open_cell": "<u4", "open_unit": "<u8", "open_sum": "<f8"}
+CELLS = {"sum": "<f8", "squares": "<f8", "rays": "<u8", "products": "<f8"}
+"""Sums of cells, as of `CellSums`."""
+
+OPEN = {"open_cell": "<u4", "open_unit": "<u8", "open_sum": "<f8", "open_flux": "<f8"}
 """What is kept of units of which more rays may come."""
 
-CELL_BYTES = 24
-"""Of a cell in memory: two sums and a count."""
+CELL_BYTES = 32
+"""Of a cell in memory: three sums and a count."""
 
 DAMAGED = "The file is damaged or cut short: copy it again, or trace the scene again."
 FOREIGN = "Give a file (.h5) that `etendue trace` or TraceResult.save wrote."
@@ -149,7 +153,7 @@ def _write(file: Any, plan: Plan, sums: Sums, folder: Path) -> None:
 
 def _put_cells(group: Any, cells: CellSums, begun: Units) -> None:
     """Sums of cells, and what they have of rays of which more copies may come."""
-    arrays: dict[str, npt.NDArray[Any]] = dict(zip(("sum", "squares", "rays", *OPEN), (*cells, *begun), strict=True))
+    arrays: dict[str, npt.NDArray[Any]] = dict(zip((*CELLS, *OPEN), (*cells, *begun), strict=True))
     for name, array in arrays.items():
         _put_array(group, name, array)
 
@@ -265,14 +269,14 @@ def _sums(group: Node, plan: Plan) -> Sums:
 
 
 def _cells(group: Node, strata: int, cells: int) -> CellSums:
-    sum_, squares = (_row(group, name, "<f8", strata, cells) for name in ("sum", "squares"))
-    return sum_, squares, _row(group, "rays", "<u8", strata, cells)
+    sum_, squares, rays, products = (_row(group, name, dtype, strata, cells) for name, dtype in CELLS.items())
+    return sum_, squares, rays, products
 
 
 def _open(group: Node) -> Units:
     length = group.dataset("open_cell", np.dtype(OPEN["open_cell"]), 1).shape[0]
-    cell, unit, sum_ = (_row(group, name, dtype, length) for name, dtype in OPEN.items())
-    return cell, unit, sum_
+    cell, unit, sum_, flux = (_row(group, name, dtype, length) for name, dtype in OPEN.items())
+    return cell, unit, sum_, flux
 
 
 def _dealing(group: Node) -> Dealing:

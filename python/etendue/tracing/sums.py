@@ -63,12 +63,12 @@ class Sums:
         (flux, rays) of each of `ENTRIES`.
     lost_at : tuple of int or None
         The face at which the first ray of each reason was lost.
-    cells : tuple of (Σ w, Σ w², units)
+    cells : tuple of CellSums
         Of each detector, shape (strata, cells) (`Dealing`); empty for those that have none.
-    sources : (Σ w, Σ w², units)
+    sources : CellSums
         Of the flux of each source, and of all of them at the end, shape (strata, sources + 1).
-    open_units : tuple of (cell, unit, Σ w)
-        Of units of which more copies may come, by detector and, at the end, by source.
+    open_units : tuple of Units
+        Of which more copies may come, by detector and, at the end, by source.
     collected : tuple of Collected
         Of each detector; empty for those that collect no rays.
     scattered : tuple of Scattered

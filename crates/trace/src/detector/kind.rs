@@ -129,7 +129,12 @@ impl Recorded {
     /// What a ray contributes to a cell.
     #[inline]
     pub fn contribute(&mut self, cell: u32, state: &RayState, amount: f64) {
-        self.contributions.push((cell, state.ray, amount));
+        self.contributions.push(Contribution {
+            cell,
+            unit: state.ray,
+            amount,
+            flux: state.flux,
+        });
     }
 }
 

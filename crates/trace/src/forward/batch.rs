@@ -27,8 +27,9 @@ use crate::medium_cache::MediumCache;
 use crate::mis::SourceLuminance;
 use crate::ray_start::start_near;
 use crate::ray_state::RayState;
+use crate::records::Contribution;
 use crate::scene::Scene;
-use crate::tallies::BatchSums;
+use crate::tallies::{BatchSums, brought_together};
 
 /// The purpose under which the events of traced rays are drawn (see [`Pairs::new`]).
 const PURPOSE_TRACE: u32 = 0x5452_4143;
@@ -65,18 +66,16 @@ struct BatchTrace<'a> {
 pub fn trace_batch(scene: &Scene, detectors: &[Detector], run: &Run<'_>, dealing: &Dealing, batch: u64) -> BatchSums {
     let mut trace = BatchTrace::new(scene, detectors, run, dealing);
     trace.batch(batch);
-    let copied = trace.block.out.detectors.iter_mut().flat_map(|d| &mut d.contributions);
-    dealing.units(batch, copied.map(|(_, ray, _)| ray));
-    dealing.units(batch, trace.block.out.copies.iter_mut().map(|(_, ray, _)| ray));
-    // Copies follow each other: one contribution for all of them.
-    trace.block.out.copies.dedup_by(|next, first| {
-        let same = (next.0, next.1) == (first.0, first.1);
-        if same {
-            first.2 += next.2;
-        }
-        same
-    });
-    trace.block.out
+    let mut out = trace.block.out;
+    let counted = detectors
+        .iter()
+        .zip(&mut out.detectors)
+        .map(|(d, recorded)| (d.cells(), &mut recorded.contributions));
+    for (cells, contributions) in counted.chain([(scene.sources.len() + 1, &mut out.copies)]) {
+        dealing.by_units(batch, contributions.iter_mut());
+        brought_together(contributions, cells);
+    }
+    out
 }
 
 /// The points at which the first rays of a run (a batch at most) start, turn and end, for drawings; a ray that escapes ends
@@ -157,7 +156,12 @@ impl<'a> BatchTrace<'a> {
         let (fluxes, all) = (&emitted.flux[..emitted.len], self.block.scene.sources.len());
         if self.dealing.stratum_of(number) > 0 {
             for cell in [number, all] {
-                let each = (self.first..).zip(fluxes).map(|(ray, flux)| (cell as u32, ray, *flux));
+                let each = (self.first..).zip(fluxes).map(|(ray, flux)| Contribution {
+                    cell: cell as u32,
+                    unit: ray,
+                    amount: *flux,
+                    flux: *flux,
+                });
                 self.block.out.copies.extend(each);
             }
             return;
@@ -169,6 +173,7 @@ impl<'a> BatchTrace<'a> {
             let cell = &mut self.block.out.own[cell];
             cell.sum += sums.0;
             cell.squares += sums.1;
+            cell.products += sums.1;
             cell.rays += emitted.len as u64;
         }
     }

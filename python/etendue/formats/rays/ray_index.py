@@ -161,7 +161,7 @@ class RayIndex(RaySet):
 
     def cone_sums(
         self, cones: Sequence[_core._Cone], threads: int | None = None, progress: Progress | None = None
-    ) -> list[tuple[_core._Cells, int]]:
+    ) -> list[tuple[_core._ConeCells, int]]:
         """For each cone the sums over the rays that it sees, as `_core.cone_sums` gives them, and the rays looked at.
 
         Examples

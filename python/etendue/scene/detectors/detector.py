@@ -62,7 +62,7 @@ class Counted:
     rays: npt.NDArray[np.int64]
 
     @classmethod
-    def of(cls, cells: CellSums, dealing: Dealing, rays: int, sources: CellSums | None = None) -> Counted:
+    def of(cls, cells: CellSums, dealing: Dealing, rays: int, sources: CellSums) -> Counted:
         """Of sums over the first `rays` rays of a run, scaled to all of them; errors as of `Dealing.variance`."""
         scale, count = dealing.rays / rays, cells[2].sum(axis=0)
         error = np.where(count > 0, np.sqrt(dealing.variance(cells, rays, sources)) * scale, np.nan)
@@ -144,9 +144,9 @@ class Detection(abc.ABC, Generic[Q]):
         """Number of scatter events that are kept at most."""
         return 0
 
-    def counted(self, cells: CellSums, sources: CellSums, dealing: Dealing, rays: int) -> Counted:  # noqa: ARG002
+    def counted(self, cells: CellSums, sources: CellSums, dealing: Dealing, rays: int) -> Counted:
         """Its cells, from sums over the first `rays` rays of a run; `sources` are those of what sources emitted."""
-        return Counted.of(cells, dealing, rays)
+        return Counted.of(cells, dealing, rays, sources)
 
     def relative_error(self, counted: Counted) -> float:
         """Median over the flux of the relative standard errors of its cells; NaN if no ray reached any."""

@@ -16,7 +16,6 @@ from etendue.description.values import Length, Pixels
 from etendue.quantities.illuminance_map import IlluminanceMap, Point
 from etendue.quantities.observer import Screen
 from etendue.quantities.powers_of_ten import counted, rounded
-from etendue.scene.dealing import CellSums, Dealing
 from etendue.scene.detectors.detector import Counted, Detection, Detector, Record, Recorded, Setting, brightest_of
 from etendue.scene.observers import ObserverKeys
 from etendue.scene.placement import Placement
@@ -54,10 +53,6 @@ class GridIlluminance(Detection[IlluminanceMap]):
     def cells(self) -> int:
         """Number of cells that flux is summed in."""
         return self.columns * self.rows
-
-    def counted(self, cells: CellSums, sources: CellSums, dealing: Dealing, rays: int) -> Counted:
-        """A ray brings a cell all its flux, as often as it comes."""
-        return Counted.of(cells, dealing, rays, sources)
 
     def read(self, recorded: Recorded) -> IlluminanceMap:
         """Flux of each cell over its area."""

@@ -7,7 +7,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, Self
 
-import numpy as np
 from annotated_types import Gt, Le
 from pydantic import model_validator
 
@@ -16,7 +15,6 @@ from etendue.description.values import AsNumber, Finite, Pixels
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.intensity_nodes import Nodes
 from etendue.quantities.measured import measured, peak_line
-from etendue.scene.dealing import CellSums, Dealing
 from etendue.scene.detectors.detector import Counted, Detection, Detector, Record, Recorded, Setting
 from etendue.scene.observers import ObserverKeys
 
@@ -49,11 +47,6 @@ class FarFieldIntensity(Detection[Intensity]):
     def cells(self) -> int:
         """Number of cells that flux is summed in: one for each node, and the last one for all rays together."""
         return len(self.nodes)
-
-    def counted(self, cells: CellSums, sources: CellSums, dealing: Dealing, rays: int) -> Counted:
-        """A ray brings nodes parts of its flux, and the cell of all rays the whole of it."""
-        found, whole = Counted.of(cells, dealing, rays), Counted.of(cells, dealing, rays, sources)
-        return dataclasses.replace(found, error=np.append(found.error[:-1], whole.error[-1]))
 
     def relative_error(self, counted: Counted) -> float:
         """As of the nodes."""
