@@ -86,12 +86,30 @@ def test_watts_are_written_as_ies_only(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["w"]
 
 
+@pytest.mark.parametrize("format", patch_folder.PATCH_FORMATS)
+def test_everything_that_is_written_can_be_replaced(source: GriddedSource, tmp_path: Path, format: str) -> None:
+    """Two writers of names and one that knows them: the dome has rectangles and meshes."""
+    target = tmp_path / "p"
+    source.save_patches(target, format, scenes=patch_folder.SCENES)
+    for name in ("sweep.csv", "sweep.png", "radiance/scene.oct"):
+        (target / name).write_text("made of it")
+    source.save_patches(target, format)
+    assert sorted(path.name for path in target.iterdir()) == ["lids", "manifest.csv", "manifest.json"]
+
+
 def test_a_folder_is_replaced_only_if_it_holds_patches(source: GriddedSource, tmp_path: Path) -> None:
     target = tmp_path / "p"
     source.save_patches(target, scenes=["radiance"])
     assert (target / "radiance" / "scene.rad").is_file()
     source.save_patches(target)
     assert not (target / "radiance").exists()
+    for name in ("notes.txt", "lids/view.png", "lids/000001.ldt.bak", "mitsuba/seen.exr", "rays/led.tm25ray"):
+        (target / name).parent.mkdir(exist_ok=True)
+        (target / name).write_text("mine")
+        with pytest.raises(ArgumentError, match=f"{name}, which would be lost"):
+            source.save_patches(target)
+        assert (target / name).read_text() == "mine"
+        (target / name).unlink()
     for name, content in (("manifest.json", '{"name": "a web page"}'), ("manifest.json", "[]"), ("manifest.json", "{")):
         other = tmp_path / "other"
         other.mkdir(exist_ok=True)

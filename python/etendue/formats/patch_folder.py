@@ -6,6 +6,7 @@ import csv
 import dataclasses
 import json
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError, FormatError
 from etendue.formats.intensity import INTENSITY_FORMATS, read_intensity
 from etendue.formats.output_folder import atomic_folder, check_output_folder
-from etendue.formats.scenes import SCENES
+from etendue.formats.scenes import SCENE_FILES, SCENES
 from etendue.formats.strict_json import strict_json
 from etendue.quantities.arguments import require, require_known, require_path
 from etendue.quantities.patches import AngularGrid, Patches
@@ -29,6 +30,19 @@ REWRITE = "Write the folder again with `etendue patches`."
 PATCH_FORMATS = {"ies": "lm63", "ldt": "eulumdat"}
 """What the intensity files can be, by extension."""
 
+OWN_FILES = re.compile(
+    "|".join(
+        (
+            r"manifest\.(json|csv)",
+            r"sweep\.(csv|png)",
+            rf"lids/\d{{6,}}\.({'|'.join(PATCH_FORMATS)})",
+            *(f"{name}/({files})" for name, files in SCENE_FILES.items()),
+            r"(.*/)?(\.DS_Store|Thumbs\.db)",
+        )
+    )
+)
+"""Names of the files that a folder of patches has, with what systems leave in any folder; others are the user's."""
+
 
 def check_patch_folder(
     folder: str | os.PathLike[str], flux_unit: str, format: str = "ies", scenes: Iterable[str] = ()
@@ -40,9 +54,17 @@ def check_patch_folder(
     UnknownNameError
         If there is no such format or ray tracer.
     ArgumentError
-        If the folder cannot be written or holds something else, or the format does not know the unit of flux.
+        If the folder cannot be written or holds something else, beside patches too, or the format does not know the unit
+        of flux.
     """
     check_output_folder(folder, is_patch_folder)
+    others = _other_files(Path(folder))
+    if others:
+        found = ", ".join(others[:3]) + (f" and {len(others) - 3:,} more" if len(others) > 3 else "")
+        raise ArgumentError(
+            f"{folder}: this folder of patches also holds {found}, which would be lost with it. Move what is yours, or "
+            "give another name."
+        )
     require_known(format, PATCH_FORMATS, "format of patches")
     for scene in scenes:
         require_known(scene, SCENES, "ray tracer")
@@ -61,6 +83,14 @@ def is_patch_folder(folder: Path) -> bool:
     return isinstance(manifest, dict) and manifest.get("kind") == KIND
 
 
+def _other_files(folder: Path) -> list[str]:
+    """What a folder holds that no folder of patches has."""
+    names = (
+        path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_symlink() or not path.is_dir()
+    )
+    return sorted(name for name in names if not OWN_FILES.fullmatch(name))
+
+
 def write_patch_folder(
     folder: str | os.PathLike[str],
     patches: Patches,
@@ -74,7 +104,7 @@ def write_patch_folder(
     Parameters
     ----------
     folder : path
-        To be made; its parent must exist. A folder of patches of that name is replaced.
+        To be made; its parent must exist. A folder of patches of that name is replaced, if it holds nothing else.
     patches : Patches
         At least one.
     facts : mapping
@@ -91,7 +121,8 @@ def write_patch_folder(
     UnknownNameError
         If there is no such format or ray tracer.
     ArgumentError
-        If the folder cannot be written or holds something else, or the format does not know the unit of flux.
+        If the folder cannot be written or holds something else, beside patches too, or the format does not know the unit
+        of flux.
     """
     require(scenes, Iterable, "scenes", f"a list of ray tracers of {', '.join(SCENES)}")
     scenes = tuple(scenes)

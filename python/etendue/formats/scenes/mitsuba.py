@@ -17,6 +17,9 @@ from etendue.quantities.patches import Patches
 from etendue.quantities.printable import printable
 from etendue.units import LUMINANCE_UNIT, MM2_PER_M2
 
+FILES = r"gridded_area\.py|scene\.xml|tables/\d{6,}\.npy|shapes/\d{6,}\.ply|__pycache__/gridded_area\..*"
+"""Names of what `write` writes, and of what Python makes of its module."""
+
 BLACK = '<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>'
 """A patch that light does not pass."""
 

@@ -13,6 +13,9 @@ import numpy as np
 from etendue.quantities.patches import Patches
 from etendue.units import MM2_PER_M2, RADIANCE_WHITE_EFFICACY
 
+FILES = r"patches\.cal|scene\.rad|tables/\d{6,}\.dat|scene\.oct"
+"""Names of what `write` writes, and of the octree that `oconv` makes of it."""
+
 SHARE = 1e-5
 """Of light that a patch that can be seen through keeps back."""
 

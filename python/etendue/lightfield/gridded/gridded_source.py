@@ -409,7 +409,8 @@ class GriddedSource:
         Parameters
         ----------
         folder : path
-            To be made, whole or not at all; see docs/formats/patches.md. A folder of patches of that name is replaced.
+            To be made, whole or not at all; see docs/formats/patches.md. A folder of patches of that name is replaced, if
+            it holds nothing else.
         format : {"ies", "ldt"}
             Of the intensity files.
         scenes : iterable of str
