@@ -11,7 +11,9 @@ import typer
 from etendue.cli.options import ray_format
 from etendue.cli.stated import refuse
 from etendue.cli.terminal import check_folder, complain, count, one_of, print_json, progress_bar, say
-from etendue.formats.rays import read_rays, write_rays
+from etendue.errors import UnitError
+from etendue.formats.rays import format_of_output, read_rays, write_rays
+from etendue.formats.rays.ray_format import RayFormat
 from etendue.lightfield.light_field import LightField
 from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_set import RaySet
@@ -35,7 +37,7 @@ def convert(
         typer.Option(
             "--unit",
             help="lm or W: the unit of OUTPUT; inputs are converted through their spectra or the totals they state. "
-            "Without it: that of --flux, or of the inputs; lm if these differ.",
+            "Without it: that of --flux, or of the inputs; lm if these differ. W where the format holds no other.",
         ),
     ] = None,
     subset: Annotated[
@@ -49,18 +51,22 @@ def convert(
     if format is not None:
         ray_format(format)
     check_folder(output)
+    chosen = format_of_output(output, format)
     if subset is None:
         refuse(["seed"], "for --subset, which draws rays; without it all are written as they are")
     if flux and len(flux) != len(inputs):
         raise typer.BadParameter(f"--flux was given {len(flux)} times for {len(inputs)} input files")
     fluxes: list[str | None] = [*flux] if flux else [None] * len(inputs)
     read = [read_rays(path) for path in inputs]
-    wanted = _unit(unit, fluxes, read)
+    wanted = _unit(unit, fluxes, read, chosen)
     sets = [in_unit(with_flux(rays, text), wanted) for rays, text in zip(read, fluxes, strict=True)]
     assumed = [note for old, new in zip(read, sets, strict=True) for note in _changes(old, new)]
     rays = RaySet.merge(sets) if len(sets) > 1 else sets[0]
     if subset is not None:
         rays = rays.subset(subset, seed)
+    if wanted is None:
+        rays, turned = _as_stored(rays, chosen)
+        assumed += turned
     with progress_bar("rays", len(rays)) as progress:
         losses = write_rays(output, rays.watched(progress) if progress else rays, format, flux_unit=wanted)
     notes = (*assumed, *losses)
@@ -79,16 +85,38 @@ def convert(
     say(f"{output}: {rays.tally.usable:,} rays, {counted(rays.total_flux, rays.flux_unit)}")
 
 
-def _unit(stated: str | None, fluxes: list[str | None], sets: list[RaySet]) -> FluxUnit | None:
-    """The unit of the output: the stated one, else that of the fluxes, else lm if the files differ; None: the file's own."""
+def _unit(stated: str | None, fluxes: list[str | None], sets: list[RaySet], chosen: RayFormat) -> FluxUnit | None:
+    """The unit of the output; None: that which all inputs have.
+
+    The stated one, else the only one of the format, else that of the fluxes and of what has none, else lm if they differ.
+    """
     if stated is not None:
-        return one_of(stated, FLUX_UNITS, "--unit")
-    ends = {
-        next((unit for unit in FLUX_UNITS if text.strip().endswith(unit)), None) for text in fluxes if text is not None
-    }
-    if None not in fluxes and len(ends) == 1 and None not in ends:
-        return "W" if "W" in ends else "lm"
-    return "lm" if len({rays.flux_unit for rays in sets}) > 1 else None
+        wanted = one_of(stated, FLUX_UNITS, "--unit")
+        if chosen.unit not in (None, wanted):
+            raise typer.BadParameter(f"--unit {wanted}: in a {chosen.title} rays have {chosen.unit}; leave it out")
+        return wanted
+    # Of rays without a spectrum the writer tells what the format wants.
+    if chosen.unit is not None and all(rays.knows_spectrum for rays in sets):
+        return chosen.unit
+    ends = [
+        next((unit for unit in FLUX_UNITS if text is not None and text.strip().endswith(unit)), None) for text in fluxes
+    ]
+    units = {end or rays.flux_unit for end, rays in zip(ends, sets, strict=True)}
+    if len(units) > 1:
+        return "lm"
+    return units.pop() if any(ends) or len({rays.flux_unit for rays in sets}) > 1 else None
+
+
+def _as_stored(rays: RaySet, chosen: RayFormat) -> tuple[RaySet, list[str]]:
+    """The rays in watts if only so a file of the format holds all that is known of them, and the note that says so."""
+    if not chosen.wants_watts(rays):
+        return rays, []
+    try:
+        watts = rays.in_unit("W")
+    except UnitError:
+        return rays, []  # the writer tells what is lost
+    reason = f"{chosen.title} holds wavelengths and spectra of rays beside W only"
+    return watts, [f"{note}; {reason}" for note in _changes(rays, watts)]
 
 
 def _changes(old: RaySet, new: RaySet) -> list[str]:

@@ -163,7 +163,7 @@ def write_rays(
     require_path(path, "write_rays: path", "the path of the file first, then the rays")
     require(rays, RayStream, "write_rays: rays", "rays, of a file et.read_rays(path)")
     path = Path(path)
-    chosen = format_named(format) if format is not None else _format_for(path)
+    chosen = format_of_output(path, format)
     if len(rays) == 0:
         raise ArgumentError(f"{path}: there are no rays to write.")
     if chosen.most_rays is not None and len(rays) > chosen.most_rays:
@@ -218,7 +218,23 @@ def format_named(name: str) -> RayFormat:
     raise UnknownNameError("ray format", name, [f.name for f in RAY_FORMATS])
 
 
-def _format_for(path: Path) -> RayFormat:
+def format_of_output(path: Path, name: str | None = None) -> RayFormat:
+    """The format that a file will have: of that name or, without one, the only one of its extension.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none of that name.
+    ArgumentError
+        If the extension belongs to none or to several.
+
+    Examples
+    --------
+    >>> format_of_output(Path("led.dis")).name, format_of_output(Path("led.ray"), "speos").unit
+    ('asap', 'W')
+    """
+    if name is not None:
+        return format_named(name)
     fitting = [f for f in RAY_FORMATS if path.suffix.lower() in f.extensions]
     if len(fitting) == 1:
         return fitting[0]

@@ -14,6 +14,7 @@ from etendue.formats.head import Head
 from etendue.quantities.file_records import AnyRecords, FileRecords
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
+from etendue.units import FluxUnit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,6 +44,8 @@ class RayFormat:
         Bytes that a number takes at least: those of a float, or of a digit and what parts it from the next.
     most_rays : int, optional
         Rays that a file holds at most, where the format or its own program has such a limit.
+    unit : {"lm", "W"}, optional
+        The one unit of flux that rays have in it, whatever they are handed over in; None: either.
     """
 
     name: str
@@ -55,6 +58,7 @@ class RayFormat:
     wants_watts: Callable[[RayStream], bool] = lambda _rays: False
     value_bytes: int = 4
     most_rays: int | None = None
+    unit: FluxUnit | None = None
 
     def least_size(self, rays: RayStream) -> int:
         """Bytes that a file of these rays has at least."""

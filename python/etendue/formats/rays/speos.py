@@ -153,5 +153,5 @@ def in_watts(rays: RayStream, instead: str) -> tuple[RayStream, list[str]]:
     return rays.in_unit("W"), ["Lumens were turned into watts through the wavelengths: Speos energies are radiant."]
 
 
-FORMAT = RayFormat("speos", "Speos binary ray file", (".ray",), recognise, read, write)
+FORMAT = RayFormat("speos", "Speos binary ray file", (".ray",), recognise, read, write, unit="W")
 """Speos binary ray files."""

@@ -100,5 +100,5 @@ def write(rays: RayStream, path: Path) -> tuple[str, ...]:
     return tuple(notes)
 
 
-FORMAT = RayFormat("speos-text", "Speos text ray file", (), recognise, read, write, value_bytes=2)
+FORMAT = RayFormat("speos-text", "Speos text ray file", (), recognise, read, write, value_bytes=2, unit="W")
 """Speos text ray files. Their extension, ``.txt``, belongs to other formats as well."""
