@@ -23,7 +23,7 @@ from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.measured import measured
 from etendue.quantities.observer import Screen
 from etendue.quantities.powers_of_ten import counted, rounded
-from etendue.quantities.unlifted import Unlifted, unlifted
+from etendue.quantities.unlifted import unlifted
 
 LIFT = 0.01
 """Share of a maximum that chance may lift it by without a word."""
@@ -80,7 +80,7 @@ def summary(lmap: LuminanceMap, regions: Sequence[AnyRegion] = ()) -> dict[str, 
         "screen": lmap.header()["screen"],
         "mean_of_live_pixels": float(values.mean()) if live.any() else None,
         "maximum": float(values.max()) if live.any() else None,
-        "maximum_apart": _apart(lmap).value if live.any() else None,
+        "maximum_apart": _largest_apart(lmap) if live.any() else None,
         "intensity": lmap.intensity,
         "relative_error": None if error is None else dataclasses.asdict(error),
         "rays": int(lmap.rays[lmap.rays > 0].sum()) if (lmap.rays >= 0).any() else None,
@@ -118,16 +118,19 @@ def _lifted(found: RegionStatistics, together: bool) -> str:
     return f" (lifted by chance from {counted(found.maximum_apart, found.unit)})"
 
 
-def _apart(lmap: LuminanceMap) -> Unlifted:
-    """The largest pixel less what chance lifts it by if each pixel errs by itself."""
+def _largest_apart(lmap: LuminanceMap) -> float:
+    """The largest pixel less what chance lifts it by if each pixel errs by itself; as it is where they err together."""
     live = ~np.isnan(lmap.values)
-    return unlifted(lmap.values[live], lmap.standard_error[live], np.ones(int(live.sum())))
+    values = lmap.values[live]
+    if pixels_err_together(lmap):
+        return float(values.max())
+    return unlifted(values, lmap.standard_error[live], np.ones(values.size)).value
 
 
 def _maximum(lmap: LuminanceMap) -> str:
     """The largest luminance with its error, and the largest pixel if chance lifts that by more than half of its error."""
     largest, error = float(np.nanmax(lmap.values)), float(lmap.standard_error.flat[np.nanargmax(lmap.values)])
-    apart = largest if pixels_err_together(lmap) else _apart(lmap).value
+    apart = _largest_apart(lmap)
     if not largest - apart > 0.5 * error:
         return measured(largest, error, lmap.unit)
     if apart < error:
