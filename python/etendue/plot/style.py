@@ -7,7 +7,7 @@ import math
 import os
 import re
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,10 +23,12 @@ from etendue.quantities.powers_of_ten import common_power, ten_to
 from etendue.quantities.printable import printable
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
+    from matplotlib.text import Text
     from matplotlib.ticker import LogFormatter, MaxNLocator, ScalarFormatter
 
 INK = "#1c1c22"
@@ -173,15 +175,23 @@ def finish(figure: Figure, path: str | os.PathLike[str] | None) -> Figure:
 
 
 def _take_texts_as_they_are(figure: Figure) -> None:
+    for text in _texts_of(figure):
+        text.set_parse_math(False)
+        text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
+
+
+def _texts_of(artist: Artist) -> Iterator[Text]:
+    """All texts but the numbers at axes, which are ours: their powers of ten are formulas, and to list them makes them."""
     from matplotlib.axis import Axis
     from matplotlib.text import Text
 
-    # Numbers at axes are ours, and their powers of ten are formulas.
-    ours = {text for axis in figure.findobj(Axis) for text in axis.findobj(Text) if text is not axis.label}
-    for text in figure.findobj(Text):
-        if text not in ours:
-            text.set_parse_math(False)
-            text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
+    if isinstance(artist, Axis):
+        yield artist.label
+        return
+    if isinstance(artist, Text):
+        yield artist
+    for child in artist.get_children():
+        yield from _texts_of(child)
 
 
 def locator_for(inches: float) -> MaxNLocator:
