@@ -11,7 +11,7 @@ from typing import Any, Literal
 import etendue as et
 import pytest
 import typer.main
-from etendue.cli import main
+from etendue.cli import main, verbs
 from etendue.lightfield.carrier import Surface
 from etendue.quantities.ray_stream import RayStream
 
@@ -19,6 +19,7 @@ from cli.outcome import Outcome, Run
 
 # What the options of all verbs are: found out once, as in a process of the program, and not for each call of a test.
 verbs_of = functools.cache(typer.main.get_command)
+command_of = functools.cache(verbs.command_of)
 
 
 @pytest.fixture
@@ -27,6 +28,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
     monkeypatch.setenv("COLUMNS", "300")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(typer.main, "get_command", verbs_of)
+    monkeypatch.setattr(verbs, "command_of", command_of)
 
     def call(*arguments: object) -> Outcome:
         capsys.readouterr()
