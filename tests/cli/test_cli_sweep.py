@@ -90,6 +90,35 @@ def test_ctrl_c_keeps_the_steps_that_are_done(
     assert "b.csv" not in files(tmp_path)
 
 
+def test_a_picture_without_room_is_refused_before_anything_is_traced(
+    run: Run, scene: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def traced(*_: Any, **__: Any) -> Iterator[Any]:
+        pytest.fail("a step was made")
+
+    monkeypatch.setattr(running, "trace_rounds", traced)
+    three = ["--set", "screen.at.2=1,2", "--set", "die.flux=1,2", "--set", "screen.shape.radius=1,2"]
+    many = ["--set", "die.flux=1,2", "--set", "screen.at.2=1:13:1"]
+    for settings, told in ((three, "one or two parameters"), (many, "13 lines in a diagram")):
+        outcome = run("sweep", scene, *settings, "--measure", "escaped", "-o", "a.csv", "-o", "a.png")
+        assert outcome.status == 1
+        assert told in outcome.err
+
+
+def test_a_table_is_kept_where_its_picture_has_no_room(run: Run, scene: Path, tmp_path: Path) -> None:
+    """Of one parameter, how many lines a diagram has is known when the units of the measures are."""
+    names = [f"wall {i}" for i in range(13)]
+    shape = 'shape = { kind = "disk", radius = 2 }\nfinish = "absorber"'
+    walls = [f'[[surfaces]]\nname = "{name}"\nat = [0, 0, {4 + i}]\n{shape}' for i, name in enumerate(names)]
+    scene.write_text("\n".join([SCENE, *walls]), encoding="utf-8")
+    measures = ",".join(f"absorbed:{name}" for name in names)
+    call = ("sweep", scene, "--set", "die.flux=1,2", "--measure", measures, "--rays", 100)
+    outcome = run(*call, "-o", "a.png", "-o", "a.csv")
+    assert outcome.status == 1
+    assert "13 lines in a diagram" in outcome.err
+    assert files(tmp_path) == ["a.csv", "die.toml"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

@@ -27,7 +27,7 @@ from etendue.cli.terminal import (
 from etendue.errors import ArgumentError
 from etendue.formats.maps import PICTURE_EXTENSIONS
 from etendue.luminance.regions import parse_region
-from etendue.plot.sweep_picture import plot_sweep
+from etendue.plot.sweep_picture import plot_sweep, require_drawable
 from etendue.quantities.measured import measured
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.powers_of_ten import counted
@@ -117,9 +117,10 @@ def sweep(
     check_outputs(outputs, (*EXTENSIONS, *PICTURE_EXTENSIONS))
     scene = Scene.load(file)
     require_apart([file, *scene.read_files()], outputs)
+    settings = _settings(setting)
     steps = sweep_steps(
         scene,
-        _settings(setting),
+        settings,
         names,
         _observers(observer, distance, target),
         _screen(size, pixels) if observer else None,
@@ -130,6 +131,8 @@ def sweep(
         cache=cache,
         threads=threads,
     )
+    if any(path.suffix.lower() in PICTURE_EXTENSIONS for path in outputs):
+        require_drawable(settings, len(steps.measures))
     table: SweepTable | None = None
     interrupted = False
     with progress_bar("steps", len(steps)) as progress:
@@ -142,7 +145,8 @@ def sweep(
                 raise
             interrupted = True
     assert table is not None  # noqa: S101 - there is at least one step
-    for path in outputs:
+    # Tables first: what was computed is not lost with a picture that cannot be drawn.
+    for path in sorted(outputs, key=lambda path: path.suffix.lower() not in EXTENSIONS):
         if path.suffix.lower() in EXTENSIONS:
             table.save(path)
         else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Sized
 from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
@@ -151,13 +151,51 @@ def plot_sweep(
     return style.finish(figure, path)
 
 
+def require_drawable(parameters: Mapping[str, Sized], measures: int) -> None:
+    """Refuse a picture of a sweep that would have no room, before the sweep is made.
+
+    Of one parameter, how many diagrams there will be depends on the units of the measures; that is found when it is drawn.
+
+    Parameters
+    ----------
+    parameters : mapping of str to values
+        As of `sweep`.
+    measures : int
+        How many there are.
+
+    Raises
+    ------
+    ArgumentError
+        If there are more than two parameters, or of two more than 12 measures or 12 values of the second.
+
+    Examples
+    --------
+    >>> require_drawable({"lens.at.2": [5, 6], "lamp.flux": [50, 100]}, 2)
+    >>> require_drawable({"a": [1], "b": [1], "c": [1]}, 1)
+    Traceback (most recent call last):
+    etendue.errors.ArgumentError: a picture of a sweep has room for one or two parameters, not for a, b, c; save the table.
+    """
+    if len(parameters) > 2:
+        raise ArgumentError(
+            f"a picture of a sweep has room for one or two parameters, not for {', '.join(parameters)}; save the table."
+        )
+    if len(parameters) == 2:
+        _, second = parameters.values()
+        _require_few(measures, len(second))
+
+
+def _require_few(panels: int, lines: int) -> None:
+    if panels > MOST_PANELS:
+        raise ArgumentError(
+            f"{panels} diagrams in a picture of a sweep; draw {MOST_PANELS} at most, and save the rest as a table."
+        )
+    if lines > MOST_LINES:
+        raise ArgumentError(f"{lines} lines in a diagram of a sweep; {MOST_LINES} can be told apart. Save the table.")
+
+
 def _panels(table: SweepTable) -> list[_Panel]:
     """The diagrams: one for each unit, of two parameters one for each measure."""
-    if len(table.parameters) > 2:
-        names = ", ".join(table.parameters)
-        raise ArgumentError(
-            f"plot_sweep: a picture has room for one or two parameters, not for {names}; save the table."
-        )
+    require_drawable(table.parameters, len(table.values))
     if not table.done or not table.values:
         raise ArgumentError("plot_sweep: no step is done; there is nothing to draw.")
     found: list[_Panel] = []
@@ -168,13 +206,7 @@ def _panels(table: SweepTable) -> list[_Panel]:
             same[0].measures.append(name)
         else:
             found.append(_Panel(unit, [name]))
-    if len(found) > MOST_PANELS:
-        raise ArgumentError(
-            f"plot_sweep: {len(found)} diagrams; draw {MOST_PANELS} at most, and save the rest as a table."
-        )
-    most = max(_lines(table, panel) for panel in found)
-    if most > MOST_LINES:
-        raise ArgumentError(f"plot_sweep: {most} lines in a diagram; {MOST_LINES} can be told apart. Save the table.")
+    _require_few(len(found), max(_lines(table, panel) for panel in found))
     return found
 
 

@@ -18,6 +18,7 @@ from etendue.quantities.luminance_map import LuminanceMap
 from etendue.quantities.ray_set import RaySet
 from etendue.scene import Scene
 from etendue.scene.detectors.detector import Counted
+from etendue.scene.detectors.illuminance import Illuminance
 from etendue.scene.sources.from_files import Field, Rays
 from etendue.scene.sources.gridded import Gridded
 from etendue.tracing.result import TraceResult
@@ -58,6 +59,8 @@ class Step:
         Luminance maps by the name of the observer.
     region : Region, PolygonRegion or None
         What of these maps counts.
+    whole : mapping of str to str
+        By the name of an illuminance detector that of another one in its place, of one cell: see `with_whole`.
 
     Examples
     --------
@@ -71,6 +74,7 @@ class Step:
     result: TraceResult | None
     maps: Mapping[str, LuminanceMap]
     region: AnyRegion | None = None
+    whole: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     @property
     def traced(self) -> TraceResult:
@@ -296,15 +300,22 @@ def _efficiency(step: Step, of: str) -> Found:
 
 @_noun("absorbed", "flux that was absorbed, by everything or by the solid, surface, face or medium named", "ledger")
 def _absorbed(step: Step, of: str) -> Found:
-    ledger = step.traced.ledger
+    ledger, plan = step.traced.ledger, step.traced.plan
     if not of:
         return _flux(ledger.absorbed.flux, step.traced)
+    # The faces of detectors, which stand behind those of the scene, absorb nothing.
+    detectors = [detection.name for detection in plan.detections if detection.HAS_FACE]
+    faces = plan.face_names[: len(plan.face_names) - len(detectors)]
     # A surface and a medium may have one name: then both are meant.
-    entries = [*ledger.by_surface.items(), *ledger.by_medium.items()]
+    entries = [*((name, ledger.by_surface[name]) for name in faces), *ledger.by_medium.items()]
     parts = [entry.flux for name, entry in entries if name == of or name.startswith(f"{of}.")]
     medium = _medium_of(step.scene, of)
     if medium not in ("", of):
         parts.append(ledger.by_medium[medium].flux)
+    if not parts and of in (detection.name for detection in plan.detections):
+        raise ArgumentError(
+            f"absorbed:{of}: {of} is a detector, which absorbs nothing; write flux:{of} for what meets it."
+        )
     if not parts:
         names = {name for name, _ in entries}
         raise UnknownNameError("solid, surface, face or medium", of, {*names, *(n.partition(".")[0] for n in names)})
@@ -350,7 +361,7 @@ def _flux_of(step: Step, of: str) -> Found:
     if isinstance(found, Intensity):
         return Found(found.flux, found.flux_error, found.flux_unit)
     if isinstance(found, IlluminanceMap):
-        return Found(found.flux, _cells_error(found, step, of, None), found.flux_unit)
+        return Found(found.flux, _cells_error(found, step, of), found.flux_unit)
     if isinstance(found, RaySet):
         return _flux(found.total_flux, result)
     raise ArgumentError(f"flux:{of}: name a detector of rays, illuminance or intensity.")
@@ -364,21 +375,55 @@ def _peak(step: Step, of: str) -> Found:
     return Found(found.peak_intensity, found.peak_error, found.unit)
 
 
-def _cells_error(found: IlluminanceMap, step: Step, of: str, inside: npt.NDArray[np.bool_] | None) -> float:
-    """Standard error of the flux [flux unit] on some cells of a detector, if a ray meets one of them, once, or none.
+def _cells_error(found: IlluminanceMap, step: Step, of: str) -> float:
+    """Standard error of the flux [flux unit] on a detector.
 
-    They are one cell then, of the sums of all of them. NaN if more flux meets the cells than there is, so that rays did so
-    several times; and of none.
+    What a ray brings to all cells together counts as one contribution, however often it comes: the detector of one cell in
+    the same place has the sum of its squares. Where there is none, a ray is taken to meet one of the cells, once, or none;
+    NaN if more flux meets the cells than there is, so that rays did so several times.
     """
     result = step.traced
-    chosen = slice(None) if inside is None else inside.ravel()
-    number = [detection.name for detection in result.plan.detections].index(of)
-    sum_, *others = (row[:, chosen] for row in result.sums.cells[number])
+    number = [detection.name for detection in result.plan.detections].index(step.whole.get(of, of))
+    sum_, *others = result.sums.cells[number]
     if sum_.shape[1] > 1 and found.flux > result.ledger.total.flux * (1.0 + ROUNDING):
         return math.nan
     sum_, squares, count, products = (row.sum(axis=1, keepdims=True) for row in (sum_, *others))
     one = sum_, squares, count, products
     return float(Counted.of(one, result.plan.dealing, result.rays_done, result.sums.sources).error[0])
+
+
+def with_whole(scene: Scene, measures: Iterable[Measure]) -> tuple[Scene, dict[str, str]]:
+    """A scene in which each illuminance detector that is measured has another one in its place, of one cell.
+
+    A ray may come to several cells, by the walls of a room, and what it brings to them is not independent. The sum of the
+    squares of what each ray brings in all is known where all cells are one.
+
+    Returns
+    -------
+    scene : Scene
+        As it was if no such detector is measured; detectors change nothing of the light.
+    whole : dict
+        The name of that detector by the name of the one that is measured.
+
+    Examples
+    --------
+    >>> desk = {"name": "desk", "kind": "illuminance", "width": 10, "height": 10, "columns": 4, "rows": 4}
+    >>> scene, whole = with_whole(Scene(detectors=[desk]), measures_of(["flux:desk"], ["desk"], []))
+    >>> whole, [detector.columns for detector in scene.detectors]
+    ({'desk': 'desk as one cell'}, [4, 1])
+    """
+    wanted = {measure.of for measure in measures if measure.reads in ("detector", "map")}
+    taken = {detector.name for detector in scene.detectors}
+    whole: dict[str, str] = {}
+    more = []
+    for i, detector in enumerate(scene.detectors):
+        name = detector.name or f"detectors[{i}]"
+        if name in wanted and isinstance(detector, Illuminance) and detector.columns * detector.rows > 1:
+            whole[name] = f"{name} as one cell"
+            while whole[name] in taken:
+                whole[name] += " of its own"
+            more.append(detector.replace(name=whole[name], columns=1, rows=1))
+    return (scene.replace(detectors=[*scene.detectors, *more]) if more else scene), whole
 
 
 # --- maps --------------------------------------------------------------------------------------------------------------
@@ -389,8 +434,9 @@ def _mean(step: Step, of: str) -> Found:
     found, inside = _map(step, of, "mean")
     value = float(np.nan_to_num(found.values[inside]).mean())
     if isinstance(found, IlluminanceMap):
-        area = found.screen.pixel_area / MM2_PER_M2 * int(inside.sum())
-        return Found(value, _cells_error(found, step, of, inside) / area, found.unit)
+        # A region is of observers' maps: all cells count.
+        area = found.screen.pixel_area / MM2_PER_M2 * found.values.size
+        return Found(value, _cells_error(found, step, of) / area, found.unit)
     values, errors = (array[inside] / int(inside.sum()) for array in (found.values, found.standard_error))
     return Found(value, _sum_error(step, found, values, errors), found.unit)
 
