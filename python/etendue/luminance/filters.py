@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
+from etendue.luminance.redrawn_maps import redrawn
 from etendue.quantities.arguments import require_known
 from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map, notes_that_stay
 from etendue.quantities.powers_of_ten import counted, rounded
@@ -25,7 +26,16 @@ SMOOTHING = ("filter ", "denoised ")
 
 TOGETHER = "pixels of light fields and of smoothed maps err together: standard errors are no less for it"
 
-PIXELS_AT_ONCE = 1 << 17
+DRAWS, FEWEST_DRAWS = 24, 6
+"""Maps drawn anew for the errors of the selective filters: each error is then known to 15 %, or to 30 % by the fewest."""
+
+MANY_PIXELS = 1 << 20
+"""Beyond these the fewer maps are drawn, the more pixels there are."""
+
+SUMMED = ("value", "error", "rays", "unknown")
+"""Fields of `_Stack` that are summed over the pixels used."""
+
+PIXELS_AT_ONCE = 1 << 14
 """Pixels that the selective filters work on together, so that their intermediate arrays stay in the cache."""
 
 
@@ -104,8 +114,10 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     light fields, and of maps that were smoothed before, err together; of these it is σ(g) = Σ w σ(f), which no
     correlation exceeds, and a note says so. Of a scene the lines of sight are independent from pixel to pixel, and what
     a light field in it does not know is not. A pixel whose error is unknown makes the errors unknown of all that use it.
-    Dead pixels add nothing, although a pixel without rays is not known exactly. For the selective filters the error is
-    that of the average of the pixels *once selected*; as the noise itself decided on the selection, it is optimistic.
+    Dead pixels add nothing, although a pixel without rays is not known exactly. For the selective filters the noise itself
+    decides on the selection, so that of independent pixels the error is made by drawing the map 24 times about g (6 to 24
+    times beyond a million pixels) with the noise of f, always the same draws, and filtering these maps: what comes out
+    scatters by it. Of maps whose pixels err together it is that of the pixels *once selected*, which is optimistic.
 
     Examples
     --------
@@ -135,6 +147,9 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     stack = _Stack.of(lmap, power)
     if chosen.selective:
         filtered = _filter_selectively(stack, row_weights, column_weights, gamma, power)
+        if power == 2:
+            variance = _redrawn_variance(stack, filtered, (row_weights, column_weights), gamma, _draws(lmap))
+            filtered = dataclasses.replace(filtered, error=variance)
     else:
         filtered = _filter_linearly(stack, row_weights, column_weights, power)
     label = f"{kind} {rows}×{columns}" + (f", γ = {gamma:g}" if chosen.selective else "")
@@ -272,42 +287,80 @@ def _correlate(array: ArrayOrCounts, weights: Array) -> ArrayOrCounts:
 
 
 def _filter_selectively(stack: _Stack, row_weights: Array, column_weights: Array, gamma: float, power: int) -> _Stack:
-    """Fig. 2.4, in bands of rows."""
-    rows, columns = stack.value.shape
-    result = _Stack(*(np.zeros_like(getattr(stack, field.name)) for field in dataclasses.fields(_Stack)))
+    """Fig. 2.4."""
+    means = _selected_means(stack.value, dataclasses.asdict(stack), (row_weights, column_weights), gamma, power)
+    return _Stack(**means, alive=stack.alive)
+
+
+def _draws(lmap: LuminanceMap) -> int:
+    return max(FEWEST_DRAWS, min(DRAWS, DRAWS * MANY_PIXELS // max(lmap.values.size, 1)))
+
+
+def _redrawn_variance(stack: _Stack, filtered: _Stack, weights: tuple[Array, Array], gamma: float, draws: int) -> Array:
+    """Variance of the filtered map among maps drawn about it; NaN where unknown."""
+    if not (stack.error > 0.0).any():
+        return filtered.error
+    known = filtered.value
+    sums, squares = np.zeros_like(known), np.zeros_like(known)
+    for again in redrawn(known, stack.value, np.sqrt(stack.error), draws):
+        deviation = _selected_means(again, {"value": again}, weights, gamma)["value"] - known
+        sums += deviation
+        squares += deviation**2
+    variance = np.maximum(squares - sums**2 / draws, 0.0) / (draws - 1)
+    # Unknown errors reach all that used them.
+    return np.where(np.isnan(filtered.error), np.nan, variance)
+
+
+def _selected_means(
+    value: Array, arrays: dict[str, npt.NDArray[Any]], weights: tuple[Array, Array], gamma: float, power: int = 1
+) -> dict[str, npt.NDArray[Any]]:
+    """Means and sums over the pixels that resemble each one (eq. 2.6), in bands of rows: those of `SUMMED` in `arrays`."""
+    rows, columns = value.shape
+    arrays = {name: array for name, array in arrays.items() if name in SUMMED}
+    result = {name: np.zeros_like(array) for name, array in arrays.items()}
     band = max(1, PIXELS_AT_ONCE // columns)
     for start in range(0, rows, band):
         stop = min(start + band, rows)
-        for field, array in _select_band(stack, row_weights, column_weights, gamma, power, start, stop).items():
-            getattr(result, field)[start:stop] = array
+        for name, array in _select_band(value, arrays, weights, gamma, power, start, stop).items():
+            result[name][start:stop] = array
     return result
 
 
 def _select_band(
-    stack: _Stack, row_weights: Array, column_weights: Array, gamma: float, power: int, start: int, stop: int
+    value: Array,
+    arrays: dict[str, npt.NDArray[Any]],
+    weights: tuple[Array, Array],
+    gamma: float,
+    power: int,
+    start: int,
+    stop: int,
 ) -> dict[str, npt.NDArray[Any]]:
-    rows, columns = stack.value.shape
-    centre = stack.value[start:stop]
+    rows, columns = value.shape
+    centre = value[start:stop]
     allowed = gamma * centre
     total = np.zeros_like(centre)
-    sums = {name: np.zeros_like(getattr(stack, name)[start:stop]) for name in ("value", "error", "rays", "unknown")}
-    for down, row_weight in _offsets(row_weights, rows):
+    sums = {name: np.zeros_like(array[start:stop]) for name, array in arrays.items()}
+    for down, row_weight in _offsets(weights[0], rows):
         here_rows, there_rows = _overlap(down, rows, start, stop)
-        for right, column_weight in _offsets(column_weights, columns):
+        for right, column_weight in _offsets(weights[1], columns):
             here_columns, there_columns = _overlap(right, columns, 0, columns)
             here, there = (here_rows, here_columns), (there_rows, there_columns)
-            chosen = np.abs(stack.value[there] - centre[here]) < allowed[here]  # eq. 2.6
+            chosen = np.abs(value[there] - centre[here]) < allowed[here]  # eq. 2.6
             weight = row_weight * column_weight
-            total[here] += weight * chosen
-            for name, factor in (("value", weight), ("error", weight**power), ("rays", 1), ("unknown", 1)):
-                # `where` and not a product: the error of a pixel that was not chosen may be unknown (NaN).
-                np.add(sums[name][here], factor * getattr(stack, name)[there], out=sums[name][here], where=chosen)
+            share = weight * chosen
+            total[here] += share
+            for name, sum_ in sums.items():
+                if name == "error":
+                    # `where` and not a product: the error of a pixel that was not chosen may be unknown (NaN).
+                    np.add(sum_[here], weight**power * arrays[name][there], out=sum_[here], where=chosen)
+                else:
+                    sum_[here] += (share if name == "value" else chosen) * arrays[name][there]
     found = total > 0.0
     scale = np.where(found, total, 1.0)
-    sums["value"] = sums["value"] / scale
-    sums["error"] = sums["error"] / scale**power
-    kept = {name: np.where(found, array, getattr(stack, name)[start:stop]) for name, array in sums.items()}
-    return {**kept, "alive": stack.alive[start:stop]}
+    for name, divisor in (("value", scale), ("error", scale**power)):
+        if name in sums:
+            sums[name] = sums[name] / divisor
+    return {name: np.where(found, array, arrays[name][start:stop]) for name, array in sums.items()}
 
 
 def _offsets(weights: Array, length: int) -> Iterator[tuple[int, float]]:
@@ -332,5 +385,11 @@ def _report(before: LuminanceMap, after: LuminanceMap, label: str, kind: FilterK
     yield f"{label}: intensity {rounded(old)} → {counted(new, unit)}{change}{dead}"
     if pixels_err_together(before) and np.isfinite(before.standard_error).any():
         yield f"{label}: {TOGETHER}"
-    if kind.selective:
-        yield f"{label}: standard errors are optimistic, because the noise itself selected the pixels that are averaged"
+    if kind.selective and np.isfinite(before.standard_error).any():
+        if pixels_err_together(before):
+            yield f"{label}: standard errors are optimistic, because the noise itself selected the pixels that are averaged"
+        else:
+            yield (
+                f"{label}: standard errors hold what the noise does by selecting the pixels that are averaged, found on "
+                f"{_draws(before)} maps drawn with the noise of this one"
+            )
