@@ -135,7 +135,9 @@ def print_filters(seed: int) -> None:
     for name, shape in (("smooth", smooth), ("smooth + ripples", smooth * ripples)):
         mean = shape * 100 / shape.mean()
         counts = rng.poisson(mean)
-        truth, noisy = (blank.replace(values=v * 1000.0, standard_error=np.sqrt(mean) * 1000.0) for v in (mean, counts))
+        # Errors, of which nothing is said here, would be worked out anew for each filter.
+        unknown = np.full(mean.shape, np.nan)
+        truth, noisy = (blank.replace(values=v * 1000.0, standard_error=unknown) for v in (mean, counts))
         for gamma in GAMMAS:
             found = [et.compare(et.filter_map(noisy, kind, size=5, gamma=gamma), truth).nrmse for kind in FILTERS]
             print(
