@@ -156,11 +156,25 @@ def test_other_ways_of_packing_are_refused(read: Read, tmp_path: Path, compressi
         read(archive({"product.xml": xml, "ldc/a.ies": ies_of(lid("none"), tmp_path)}, compression))
 
 
-def test_other_archives_are_none(tmp_path: Path) -> None:
-    (tmp_path / "a.zip").write_bytes(archive({"led.ies": b"IESNA"}))
+@pytest.mark.parametrize("compression", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
+@pytest.mark.parametrize("name", ["a.ies", "b.ldt"])
+def test_other_archives_are_none(tmp_path: Path, name: str, compression: int) -> None:
+    write_intensity(tmp_path / name, lid("none"))
+    (tmp_path / "a.zip").write_bytes(archive({name: (tmp_path / name).read_bytes()}, compression))
     assert detect_intensity_format(tmp_path / "a.zip") is None
     with pytest.raises(UnsupportedFormatError, match="a ZIP archive"):
         detect_format(tmp_path / "a.zip")
+
+
+@pytest.mark.parametrize("first", ["product.xml", "ldc/a.ies", "ldc/b.ldt"])
+def test_members_that_are_not_compressed_are_not_taken_for_the_file(read: Read, tmp_path: Path, first: str) -> None:
+    """Whichever stands first in the archive, its text is seen at the beginning."""
+    write_intensity(tmp_path / "b.ldt", lid("both"))
+    members = {"product.xml": TWO.encode(), "ldc/a.ies": ies_of(lid("none"), tmp_path)}
+    members["ldc/b.ldt"] = (tmp_path / "b.ldt").read_bytes()
+    content = archive({first: members.pop(first), **members}, zipfile.ZIP_STORED)
+    for photometry, symmetry in (("p1", "none"), ("p2", "both")):
+        assert np.allclose(read(content, photometry).values, lid(symmetry).values, rtol=1e-5)
 
 
 @pytest.mark.parametrize(("stated", "count"), [("ldc/ies", 0), ("LDC/IES", 0), ("ldc/eulumdat", 1), ("ldc/iesxml", 1)])

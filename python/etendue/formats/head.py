@@ -20,6 +20,9 @@ STEP_SIGNATURE = b"ISO-10303-21"
 WORKBOOK_SIGNATURE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 """How the container of Excel's older workbooks (.xls) begins."""
 
+ZIP_SIGNATURE = b"PK\x03\x04"
+"""How ZIP archives begin. Members that are not compressed stand in them as they are."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Head:
@@ -55,6 +58,11 @@ class Head:
     def is_text(self) -> bool:
         """Whether the head holds no control characters but white space; decides between binary and text formats."""
         return not any(b < 32 and b not in (9, 10, 11, 12, 13, 26) for b in self.data[:4096])
+
+    @property
+    def is_zip(self) -> bool:
+        """Whether this is a ZIP archive, whose members may be text of any format."""
+        return self.data.startswith(ZIP_SIGNATURE)
 
     @property
     def lines(self) -> list[str]:

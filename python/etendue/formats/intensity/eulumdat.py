@@ -47,7 +47,7 @@ def recognise(head: Head) -> bool:
 
     Type and symmetry may be any digit: the reader says which it does not know, and where.
     """
-    if head.lines and head.lines[0].lstrip().upper().startswith("TILT"):
+    if head.is_zip or (head.lines and head.lines[0].lstrip().upper().startswith("TILT")):
         return False
     words = [_first_word(line) for line in head.lines[1:7]]
     numbers = [value for word in words if (value := number(word.replace(",", "."))) is not None]

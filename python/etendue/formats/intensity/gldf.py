@@ -33,7 +33,7 @@ LISTED = 20
 
 def recognise(head: Head) -> bool:
     """A ZIP archive with a member product.xml."""
-    if not head.data.startswith(b"PK\x03\x04"):
+    if not head.is_zip:
         return False
     try:
         return _product(Archive(head.path)) is not None

@@ -49,7 +49,7 @@ _KEYWORD = re.compile(r"\s*\[\s*([^\]]*?)\s*\]\s*(.*?)\s*")
 
 def recognise(head: Head) -> bool:
     """A file with a line ``TILT=``, or one that begins with the tag of an edition."""
-    lines = head.lines
+    lines = [] if head.is_zip else head.lines
     return any(_TILT.fullmatch(line) for line in lines) or bool(lines and _TAG.match(lines[0]))
 
 
