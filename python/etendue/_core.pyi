@@ -467,7 +467,10 @@ class Dealing:
 
     def __new__(cls, fluxes: Sequence[float], sets: Sequence[tuple[int, int] | None], rays: int) -> Dealing: ...
     def strata(self) -> int:
-        """Number of strata: the rays of their own, and each set of which copies are given out."""
+        """Number of strata: what sources draw, each set beside other sources, and each of which copies are given out."""
+
+    def plain(self) -> int:
+        """Number of strata without copies, which are the first ones."""
 
     def sources(self) -> list[tuple[int, int]]:
         """Stratum of each source, and its rays in the whole run."""

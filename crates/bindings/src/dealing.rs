@@ -31,6 +31,11 @@ impl Dealing {
         self.0.strata()
     }
 
+    /// Number of strata without copies, which are the first ones.
+    const fn plain(&self) -> usize {
+        self.0.plain()
+    }
+
     /// Of each source: its stratum, and its rays in the whole run.
     fn sources(&self) -> Vec<(usize, u64)> {
         let count = self.0.sources();

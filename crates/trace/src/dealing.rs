@@ -3,7 +3,8 @@
 //! A set of n rays that has to give out more than n of them gives out each several times, and sources may share a set. Copies
 //! of one ray are not independent of each other: the light field that a set is a sample of is known no better by them. What
 //! is independent is called a *unit* here: a ray of its own, or a ray of a set with all its copies. Units of one *stratum*
-//! were drawn alike: stratum 0 has the rays of their own, each set with copies is a stratum of its own.
+//! were drawn alike: stratum 0 has what sources draw; each set of rays beside other sources, and each with copies, is a stratum
+//! of its own, those with copies at the end.
 
 use std::ops::Range;
 
@@ -32,6 +33,8 @@ pub struct Dealing {
     counts: Vec<u64>,
     /// The stratum of each source.
     stratum: Vec<usize>,
+    /// Number of strata without copies.
+    plain: usize,
     /// For each stratum its first unit; at the end, the first number that is none. Rays of their own are their own units.
     units: Vec<u64>,
 }
@@ -54,21 +57,31 @@ impl Dealing {
             shares,
             counts: Vec::new(),
             stratum: vec![0; fluxes.len()],
+            plain: 1,
             units: vec![0, rays],
         };
         dealing.counts = dealing.edges(rays).windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let mut strata: Vec<usize> = Vec::new();
-        for (source, set) in sets.iter().enumerate() {
-            let Some((number, length)) = *set else { continue };
-            let several = sets.iter().flatten().filter(|other| other.0 == number).count() > 1;
-            if (several || dealing.counts[source] > length) && (1..LONGEST).contains(&length) {
-                let known = strata.iter().position(|other| *other == number);
-                let place = known.unwrap_or_else(|| {
-                    strata.push(number);
-                    dealing.units.push(dealing.units[strata.len()] + length);
-                    strata.len() - 1
-                });
-                dealing.stratum[source] = place + 1;
+        // Those without copies first.
+        let shared = |number| sets.iter().flatten().filter(|other| other.0 == number).count() > 1;
+        for with_copies in [false, true] {
+            let mut strata: Vec<(usize, usize)> = Vec::new();
+            for (source, set) in sets.iter().enumerate() {
+                let Some((number, length)) = *set else { continue };
+                let has_copies = shared(number) || dealing.counts[source] > length;
+                let alone = sets.len() == 1 && !has_copies;
+                if has_copies != with_copies || alone || !(1..LONGEST).contains(&length) {
+                    continue;
+                }
+                let known = strata.iter().find(|other| other.0 == number);
+                let stratum = known.map_or(dealing.strata(), |known| known.1);
+                if stratum == dealing.strata() {
+                    strata.push((number, stratum));
+                    dealing.units.push(dealing.units[stratum] + length);
+                }
+                dealing.stratum[source] = stratum;
+            }
+            if !with_copies {
+                dealing.plain = dealing.strata();
             }
         }
         dealing
@@ -114,6 +127,12 @@ impl Dealing {
     #[must_use]
     pub fn count(&self, source: usize) -> u64 {
         self.counts[source]
+    }
+
+    /// Number of strata without copies, which are the first ones.
+    #[must_use]
+    pub const fn plain(&self) -> usize {
+        self.plain
     }
 
     /// The stratum of a source's rays.
@@ -168,10 +187,13 @@ impl Dealing {
             .collect()
     }
 
-    /// The unit of ray `i` of a source that gives out a set with copies.
+    /// The unit of ray `i` of a source that has a stratum of its own.
     #[allow(clippy::cast_possible_truncation, reason = "a quotient below the set's length")]
     fn unit(&self, source: usize, i: u64) -> u64 {
         let first = self.units[self.stratum[source]];
+        if self.stratum[source] < self.plain {
+            return first + i;
+        }
         let length = self.units[self.stratum[source] + 1] - first;
         first + (u128::from(i) * u128::from(length) / u128::from(self.counts[source])) as u64
     }
@@ -188,6 +210,9 @@ impl Dealing {
     /// What a unit brings in the whole run, of which a ray of that source has this flux: a source's rays carry its share of
     /// what the set says of them.
     fn whole(&self, source: usize, unit: u64, flux: f64) -> f64 {
+        if self.stratum[source] < self.plain {
+            return flux;
+        }
         let each = |source: usize| self.fluxes[source] / self.counts[source] as f64;
         let own = each(source);
         let sharing = (0..self.sources()).filter(|s| self.stratum[*s] == self.stratum[source] && self.counts[*s] > 0);
@@ -195,8 +220,8 @@ impl Dealing {
         flux * sharing.map(part).sum::<f64>()
     }
 
-    /// Of the rays of a batch, by their numbers in the run: the source and the unit of those with copies.
-    fn copied(&self, batch: u64) -> impl Fn(u64) -> Option<(usize, u64)> {
+    /// Of the rays of a batch, by their numbers in the run: the source and the unit of those outside stratum 0.
+    fn unit_of(&self, batch: u64) -> impl Fn(u64) -> Option<(usize, u64)> {
         let ranges = self.batch(batch);
         let mut firsts = vec![self.first(batch)];
         firsts.extend(ranges.iter().scan(self.first(batch), |first, range| {
@@ -205,25 +230,25 @@ impl Dealing {
         }));
         move |ray| {
             let source = firsts.partition_point(|first| *first <= ray) - 1;
-            let copied = self.stratum.get(source).is_some_and(|stratum| *stratum > 0);
-            copied.then(|| (source, self.unit(source, ranges[source].start + (ray - firsts[source]))))
+            let apart = self.stratum.get(source).is_some_and(|stratum| *stratum > 0);
+            apart.then(|| (source, self.unit(source, ranges[source].start + (ray - firsts[source]))))
         }
     }
 
     /// Of rays of one batch, by their numbers in the run: their units, and what these bring in the whole run over the flux of
     /// the ray.
     pub fn units(&self, batch: u64, rays: impl Iterator<Item = u64>) -> Vec<(u64, f64)> {
-        let copied = self.copied(batch);
-        let of = |ray| copied(ray).map_or((ray, 1.0), |(source, unit)| (unit, self.whole(source, unit, 1.0)));
+        let unit_of = self.unit_of(batch);
+        let of = |ray| unit_of(ray).map_or((ray, 1.0), |(source, unit)| (unit, self.whole(source, unit, 1.0)));
         rays.map(of).collect()
     }
 
     /// The contributions of rays of one batch as those of units.
     pub fn by_units<'a>(&self, batch: u64, contributions: impl Iterator<Item = &'a mut Contribution>) {
         if self.strata() > 1 {
-            let copied = self.copied(batch);
+            let unit_of = self.unit_of(batch);
             for of_ray in contributions {
-                if let Some((source, unit)) = copied(of_ray.unit) {
+                if let Some((source, unit)) = unit_of(of_ray.unit) {
                     of_ray.unit = unit;
                     of_ray.flux = self.whole(source, unit, of_ray.flux);
                 }
@@ -245,9 +270,9 @@ impl Dealing {
     #[must_use]
     pub fn ahead(&self, done: u64) -> Vec<u64> {
         let mut ahead = self.units[1..].to_vec();
-        ahead[0] = 0;
+        ahead[..self.plain].fill(0);
         for (source, dealt) in self.dealt(done).enumerate() {
-            if self.stratum[source] > 0 && dealt < self.counts[source] {
+            if self.stratum[source] >= self.plain && dealt < self.counts[source] {
                 let next = self.unit(source, dealt);
                 let least = &mut ahead[self.stratum[source]];
                 *least = (*least).min(next);
@@ -264,8 +289,8 @@ impl Dealing {
         let mut parts: Vec<(usize, u64, u64)> = Vec::new();
         for (source, dealt) in self.dealt(done).enumerate() {
             let stratum = self.stratum[source];
-            if stratum == 0 {
-                found[0] += dealt;
+            if stratum < self.plain {
+                found[stratum] += dealt;
             } else if dealt > 0 {
                 let length = self.units[stratum + 1] - self.units[stratum];
                 let met = if self.counts[source] > length {
@@ -300,11 +325,12 @@ mod tests {
     #[test]
     fn sets_with_copies_are_strata_of_their_own() {
         let dealing = dealing();
-        assert_eq!(dealing.stratum, [0, 1, 0, 2, 2]);
-        assert_eq!(dealing.strata(), 3);
-        assert_eq!(dealing.done(dealing.rays)[1..], [1000, 7]);
-        let own = dealing.count(0) + dealing.count(2);
-        assert_eq!(dealing.done(dealing.rays)[0], own);
+        assert_eq!(dealing.stratum, [0, 2, 1, 3, 3]);
+        assert_eq!((dealing.plain(), dealing.strata()), (2, 4));
+        assert_eq!(
+            dealing.done(dealing.rays),
+            [dealing.count(0), dealing.count(2), 1000, 7]
+        );
         assert_eq!(Dealing::new(&[1.0], &[Some((0, 1000))], 1000).strata(), 1);
         assert_eq!(Dealing::new(&[1.0], &[Some((0, 1000))], 1001).strata(), 2);
     }
@@ -321,13 +347,13 @@ mod tests {
             assert!(units.iter().all(|u| *u >= ahead[dealing.stratum(*u)]));
             met.extend(units.iter().filter(|u| dealing.stratum(**u) > 0).copied());
             let found = |stratum| met.iter().filter(|u| dealing.stratum(**u) == stratum).count() as u64;
-            assert_eq!(dealing.done(to)[1..], [found(1), found(2)]);
+            assert_eq!(dealing.done(to)[1..], [1, 2, 3].map(found));
             // What is still open was given out already.
             let ahead = dealing.ahead(to);
-            assert!((1..3).all(|s| to == dealing.rays || met.contains(&ahead[s]) || met.contains(&(ahead[s] - 1))));
+            assert!((2..4).all(|s| to == dealing.rays || met.contains(&ahead[s]) || met.contains(&(ahead[s] - 1))));
         }
         assert_eq!(all, dealing.rays);
-        assert_eq!(met.len(), 1007);
+        assert_eq!(met.len() as u64, 1007 + dealing.count(2));
     }
 
     #[test]

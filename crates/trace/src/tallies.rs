@@ -11,29 +11,31 @@ use crate::scene::Scene;
 /// Sums of cells over the batches of a work unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tally {
-    /// Of rays of their own.
+    /// Of rays without copies, stratum by stratum.
     pub cells: Vec<Cell>,
     /// Of rays with copies: what each unit (see [`Dealing`]) adds to a cell, in the order of cells and units.
     pub copies: Vec<Contribution>,
 }
 
 impl Tally {
-    /// Empty cells.
+    /// So many empty cells.
     #[must_use]
-    pub fn new(cells: usize) -> Self {
+    pub fn new(cells: usize, dealing: &Dealing) -> Self {
         Self {
-            cells: vec![Cell::default(); cells],
+            cells: vec![Cell::default(); cells * dealing.plain()],
             copies: Vec::new(),
         }
     }
 
     /// Adds the contributions of a batch, [`brought_together`].
     pub fn add(&mut self, contributions: &[Contribution], dealing: &Dealing) {
+        let each = self.cells.len() / dealing.plain();
         for contribution in contributions {
-            if dealing.stratum(contribution.unit) > 0 {
-                self.copies.push(*contribution);
+            let stratum = dealing.stratum(contribution.unit);
+            if stratum < dealing.plain() {
+                self.cells[stratum * each + contribution.cell as usize].add(contribution);
             } else {
-                self.cells[contribution.cell as usize].add(contribution);
+                self.copies.push(*contribution);
             }
         }
     }
@@ -179,7 +181,7 @@ pub struct BatchSums {
     pub ledger: Ledger,
     /// What each detector recorded.
     pub detectors: Vec<Recorded>,
-    /// Flux that each source gave out as rays of their own, and all of them together.
+    /// Flux that each source gave out as rays without copies, and all of them together, stratum by stratum.
     pub own: Vec<Cell>,
     /// Flux that sources gave out as copies of rays, and all of them together.
     pub copies: Vec<Contribution>,
@@ -188,14 +190,14 @@ pub struct BatchSums {
 impl BatchSums {
     /// Nothing yet, of one of the batches of a run.
     #[must_use]
-    pub fn new(scene: &Scene, detectors: &[Detector], batches: u64) -> Self {
+    pub fn new(scene: &Scene, detectors: &[Detector], dealing: &Dealing, batches: u64) -> Self {
         Self {
             ledger: Ledger::new(scene),
             detectors: detectors
                 .iter()
                 .map(|d| Recorded::of_batch(d.most_events(), batches))
                 .collect(),
-            own: vec![Cell::default(); scene.sources.len() + 1],
+            own: vec![Cell::default(); (scene.sources.len() + 1) * dealing.plain()],
             copies: Vec::new(),
         }
     }
@@ -204,11 +206,11 @@ impl BatchSums {
 impl TraceSums {
     /// Nothing yet.
     #[must_use]
-    pub fn new(scene: &Scene, detectors: &[Detector]) -> Self {
+    pub fn new(scene: &Scene, detectors: &[Detector], dealing: &Dealing) -> Self {
         Self {
             ledger: Ledger::new(scene),
-            tallies: detectors.iter().map(|d| Tally::new(d.cells())).collect(),
-            emitted: Tally::new(scene.sources.len() + 1),
+            tallies: detectors.iter().map(|d| Tally::new(d.cells(), dealing)).collect(),
+            emitted: Tally::new(scene.sources.len() + 1, dealing),
             records: vec![Vec::new(); detectors.len()],
             events: detectors.iter().map(|d| EventReservoir::new(d.most_events())).collect(),
             arrivals: Vec::new(),
@@ -220,7 +222,7 @@ impl TraceSums {
     /// The sums of batches, in their order.
     #[must_use]
     pub fn of(scene: &Scene, detectors: &[Detector], dealing: &Dealing, batches: Vec<BatchSums>) -> Self {
-        let mut sums = Self::new(scene, detectors);
+        let mut sums = Self::new(scene, detectors, dealing);
         for batch in batches {
             sums.add(batch, dealing);
         }
@@ -291,11 +293,9 @@ mod tests {
     #[test]
     fn copies_that_go_on_from_one_work_unit_to_the_next_are_one_contribution() {
         let rays = 5 * BATCH + 1234;
-        // A lamp of its own, a set of 1000 rays given out many times, one of 7 that two sources share.
-        let (fluxes, sets) = (
-            [0.3, 1.7, 0.05, 0.11],
-            [None, Some((0, 1000)), Some((1, 7)), Some((1, 7))],
-        );
+        // A lamp, a set of 1000 rays given out many times, one of 7 that two sources share, one of which a part is given out.
+        let fluxes = [0.3, 1.7, 0.05, 0.11, 0.2];
+        let sets = [None, Some((0, 1000)), Some((1, 7)), Some((1, 7)), Some((2, 1_000_000))];
         let dealing = Dealing::new(&fluxes, &sets, rays);
         let stream = Stream::new(5, 1);
         // Flux of the record that a ray of a source is of, over what the source says of all of them.
@@ -341,7 +341,7 @@ mod tests {
             let (_, unit, flux) = ray(number / BATCH, number);
             *brought.entry(unit).or_default() += flux;
         }
-        let mut expected = vec![Cell::default(); 9];
+        let mut expected = vec![Cell::default(); 12];
         for ((cell, unit), w) in whole {
             expected[dealing.stratum(unit) * 3 + cell as usize].add(&Contribution {
                 cell,
@@ -351,9 +351,9 @@ mod tests {
             });
         }
         for cuts in [&[0, 6][..], &[0, 1, 2, 3, 4, 5, 6], &[0, 2, 5, 6]] {
-            let (mut found, mut open) = (vec![Cell::default(); 9], Vec::new());
+            let (mut found, mut open) = (vec![Cell::default(); 12], Vec::new());
             for pair in cuts.windows(2) {
-                let mut tally = Tally::new(3);
+                let mut tally = Tally::new(3, &dealing);
                 (pair[0]..pair[1]).for_each(|batch| tally.add(&contributions(batch), &dealing));
                 tally.settle();
                 let joined = join(&dealing, &open, &tally.copies, (pair[1] * BATCH).min(rays));

@@ -154,7 +154,7 @@ def trace(
 
 def _copied(plan: Plan) -> bool:
     """Whether a source gives out rays of a set more than once."""
-    return plan.dealing.strata > 1
+    return plan.dealing.strata > plan.dealing.plain
 
 
 def _how_to_go_on(outputs: list[Path]) -> str:

@@ -95,8 +95,9 @@ def _map(events: ScatterEvents, image: Forward, observer: Observer, screen: Scre
 
 
 def _stretches(events: ScatterEvents) -> Iterator[tuple[int, npt.NDArray[np.uint64], npt.NDArray[np.float64]]]:
-    """The events as words, some at a time, with their stratum, and the flux of the ray of each with all its copies, which stay
-    together.
+    """The events as words, some at a time, with their stratum, and the flux of the ray of each, its copies included.
+
+    Those of a ray and of all its copies stay together.
     """
     rows, dealing = events.rows, events.dealing
     ray = rows["ray"] & RAY

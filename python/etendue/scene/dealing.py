@@ -21,7 +21,7 @@ Units = tuple[npt.NDArray[np.uint32], Counts, Array, Array]
 """Rays with copies: cell, unit, Σ w and flux in the whole run, in the order of cells and units."""
 
 Tally = tuple[CellSums, Units]
-"""Of a work unit: sums of the rays without copies, shape (cells,), and what those with copies add."""
+"""Of a work unit: sums of the rays without copies, shape (plain strata · cells,), and what those with copies add."""
 
 ROUNDED = 12.0 * 2.0**-53
 """Sums of n terms are off by up to n/2⁵³ of themselves [Higham2002]_, and variances are made of up to twelve such."""
@@ -33,8 +33,8 @@ class Dealing:
 
     A source of n rays that gives out more than n gives out each several times, and sources may share a set. Copies of one
     ray are not independent of each other. What is independent is called a *unit*: a ray of its own, or a ray of a set with
-    all its copies. Units of one *stratum* are alike: stratum 0 has the rays of their own, and each set of which copies are
-    given out is a stratum.
+    all its copies. Units of one *stratum* are alike: stratum 0 has what sources draw; each set of rays beside other sources
+    is a stratum, and each of which copies are given out, at the end.
 
     Parameters
     ----------
@@ -95,13 +95,18 @@ class Dealing:
         """Number of strata."""
         return self.core.strata()
 
+    @property
+    def plain(self) -> int:
+        """Number of strata without copies, which are the first ones."""
+        return self.core.plain()
+
     def done(self, rays: int) -> npt.NDArray[np.int64]:
         """Units of each stratum among the first `rays` rays, shape (strata,)."""
         return np.array(self.core.done(rays), dtype=np.int64)
 
     def nothing(self, tally: Tally) -> tuple[CellSums, Units]:
         """Sums of as many cells as a tally has, before anything is added, and no open units."""
-        shape = self.strata, len(tally[0][0])
+        shape = self.strata, len(tally[0][0]) // self.plain
         none = np.zeros(0, np.uint32), np.zeros(0, np.uint64), np.zeros(0), np.zeros(0)
         return (np.zeros(shape), np.zeros(shape), np.zeros(shape, np.uint64), np.zeros(shape)), none
 
@@ -138,8 +143,8 @@ class Dealing:
         own, copies = tally
         added = sums[0].copy(), sums[1].copy(), sums[2].copy(), sums[3].copy()
         for total, part in zip(added, own, strict=True):
-            np.add(total[0], part, out=total[0])
-        if self.strata > 1:
+            np.add(total[: self.plain], part.reshape(self.plain, -1), out=total[: self.plain])
+        if self.strata > self.plain:
             cell, stratum, grown, begun = self.core.join(begun, copies, rays)
             for total, part in zip(added, grown, strict=True):
                 # Each cell of a stratum comes once.
@@ -170,8 +175,10 @@ class Dealing:
         --------
         Of five rays, two of flux 3 go to the left, three of flux 1 to the right: what is known is the difference.
 
-        >>> cells = np.array([[6.0, 3.0]]), np.array([[18.0, 3.0]]), np.array([[2, 3]], np.uint64), np.array([[18.0, 3.0]])
-        >>> emitted = np.array([[9.0, 9.0]]), np.array([[21.0, 21.0]]), np.array([[5, 5]], np.uint64), np.array([[21.0, 21.0]])
+        >>> def sums(w, v):
+        ...     return w.sum(0)[None], (w * w).sum(0)[None], (w > 0).sum(0)[None].astype(np.uint64), (w * v).sum(0)[None]
+        >>> v = np.array([[3.0], [3.0], [1.0], [1.0], [1.0]])
+        >>> cells, emitted = sums(v * [[1, 0], [1, 0], [0, 1], [0, 1], [0, 1]], v), sums(v * [1, 1], v)
         >>> Dealing((9.0,), ((0, 5),), 5).variance(cells, 5, emitted).round(9).tolist()
         [3.333333333, 3.333333333]
         """
@@ -185,7 +192,7 @@ class Dealing:
         restated = _cleared(squares - 2.0 * share * products + share * share * square, parts, units)
         stated = self._stated(sources)[:, None]
         variance = stated * restated + (1.0 - stated) * variance
-        # Rays of their own are many; of a set of few rays the last factor matters.
+        # What sources draw are many rays; of a set of few the last factor matters.
         factor = np.divide(units, units - 1.0, out=np.full_like(units, np.nan), where=units > 1.0)
         factor[0] = 1.0
         total: Array = np.where(count > 0, variance * factor, 0.0).sum(axis=0)
@@ -216,10 +223,10 @@ class Dealing:
         left = np.zeros_like(squares)
         left[:, :-1] = np.maximum(1.0 - given[:, :-1] / np.maximum(length, 1.0), 0.0)
         left[:, :-1][:, length == 0.0] = 0.0
-        for stratum, members in self.copied():
+        for stratum, members in self._sets(1):
             left[stratum, -1] = max(1.0 - given[stratum, -1] / length[members[0]], 0.0)
         variance = left * _spread(sources)
-        # Sources without copies are independent of each other.
+        # Sources that draw their rays are independent of each other.
         variance[0, -1] = variance[0, :-1].sum()
         return variance
 
@@ -231,8 +238,12 @@ class Dealing:
 
     def copied(self) -> Iterator[tuple[int, list[int]]]:
         """Each stratum of copies, with the numbers of its sources."""
+        return self._sets(self.plain)
+
+    def _sets(self, first: int) -> Iterator[tuple[int, list[int]]]:
+        """Each stratum from the first one on, with the numbers of its sources."""
         of_source = [stratum for stratum, _ in self.core.sources()]
-        for stratum in range(1, self.strata):
+        for stratum in range(first, self.strata):
             yield stratum, [i for i, held in enumerate(of_source) if held == stratum]
 
     def most_copies(self) -> float:

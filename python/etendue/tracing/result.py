@@ -163,7 +163,7 @@ class TraceResult(InNotebook):
             worth = min(self._effective[i] for i in sources)
             told = f"{names}: {rays:,} rays are copies of {units[stratum]:,} rays of the set"
             yield f"{told}, as good as {worth:,.0f} equal rays; errors are those of these, more copies do not lessen them"
-        if dealing.strata > 1 and len(given) > 1:
+        if dealing.strata > dealing.plain and len(given) > 1:
             yield f"the rays of all sources are as good as {self.effective_rays:,.0f} equal rays"
 
     def _entries(self, row: tuple[Array, Counts]) -> list[Entry]:

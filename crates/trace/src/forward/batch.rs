@@ -105,7 +105,7 @@ impl<'a> BatchTrace<'a> {
                 wavelength: None,
                 trails: None,
                 far: 0.0,
-                out: BatchSums::new(scene, detectors, run.rays.div_ceil(BATCH)),
+                out: BatchSums::new(scene, detectors, dealing, run.rays.div_ceil(BATCH)),
             },
             dealing,
             pairs: Pairs::new(run.seed, PURPOSE_TRACE),
@@ -154,7 +154,8 @@ impl<'a> BatchTrace<'a> {
     #[allow(clippy::cast_possible_truncation, reason = "a scene has fewer than 2^32 sources")]
     fn count(&mut self, emitted: &RayBatch, number: usize) {
         let (fluxes, all) = (&emitted.flux[..emitted.len], self.block.scene.sources.len());
-        if self.dealing.stratum_of(number) > 0 {
+        let stratum = self.dealing.stratum_of(number);
+        if stratum >= self.dealing.plain() {
             for cell in [number, all] {
                 let each = (self.first..).zip(fluxes).map(|(ray, flux)| Contribution {
                     cell: cell as u32,
@@ -170,7 +171,7 @@ impl<'a> BatchTrace<'a> {
             .iter()
             .fold((0.0, 0.0), |(sum, squares), w| (sum + w, squares + w * w));
         for cell in [number, all] {
-            let cell = &mut self.block.out.own[cell];
+            let cell = &mut self.block.out.own[stratum * (all + 1) + cell];
             cell.sum += sums.0;
             cell.squares += sums.1;
             cell.products += sums.1;
