@@ -48,3 +48,12 @@ def test_the_threshold_that_is_chosen_is_told(run: Run, tmp_path: Path) -> None:
     )
     assert et.GriddedSource.load(tmp_path / "chosen").threshold == chosen
     assert "chosen" not in "".join(run("patches", "a.tm25ray", "-o", "b", "--threshold", 2, "--json").json["notes"])
+
+
+def test_rays_drawn_from_patches_tell_each_note_once(run: Run, tmp_path: Path) -> None:
+    position, direction = rays_aslant(2000)
+    source = et.GriddedSource.fit(et.RaySet(position, direction, np.ones(2000)), et.Plane(z=0), 0.7)
+    source.save_patches(tmp_path / "folder")
+    told = run("sample", "folder", "-n", 100, "-o", "a.csv", "-o", "b.tm25ray", "--json").json["notes"]
+    assert sum(source.flux_note in note for note in told) == 1
+    assert any(note.startswith("b.tm25ray: ") for note in told)

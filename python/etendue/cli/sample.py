@@ -49,7 +49,7 @@ def sample(
     for path in output:
         with progress_bar(path.name, rays) as progress:
             notes = write_rays(path, stream.watched(progress) if progress else stream, format)
-        losses += [f"{path}: {note}" for note in notes]
+        losses += [f"{path}: {note}" for note in notes if note not in source.notes]
     if json:
         facts = {"file": file, "outputs": output, "rays": rays, "seed": seed}
         print_json(
