@@ -11,13 +11,18 @@ from etendue.cli.stated import refuse
 from etendue.cli.terminal import check_folder, complain, count, half_width, one_of, print_json, say
 from etendue.instruments.directional_scan import DirectionalScan
 from etendue.instruments.goniometer_measurement import Method
-from etendue.instruments.goniometer_scan import Way
+from etendue.instruments.goniometer_scan import GoniometerScan, Way
 from etendue.instruments.positions import Plane
 from etendue.instruments.samples import read_sample
+from etendue.instruments.scan_peak import scan_peak
 from etendue.instruments.scatter_goniometer import BARE_STEP, SPAN, STEP, ScatterGoniometer
+from etendue.quantities.measured import measured_largest
 from etendue.quantities.powers_of_ten import counted
 
 COLLIMATED = 0.0
+
+ROUNDED = 1e-9
+"""Relative error below which it is none but rounding."""
 
 WINDOW = 6.0
 """Span of a window if nothing is said [°]."""
@@ -184,11 +189,7 @@ def goniometer(
         "fwhm": scan.fwhm,
         "notes": list(scan.notes),
     }
-    facts |= (
-        {"peak_flux": scan.peak}
-        if sample is None
-        else {"peak": float(scan.bsdf.max()), "total_scatter": scan.total_scatter}
-    )
+    facts |= {"peak_flux": scan.peak} if sample is None else {**_peak(scan), "total_scatter": scan.total_scatter}
     if json:
         print_json(facts)
         return
@@ -200,24 +201,36 @@ def goniometer(
     if sample is None:
         say(f"instrument function: {half_width(scan.fwhm)}")
     else:
-        say(f"peak {counted(float(scan.bsdf.max()), '1/sr')}, {half_width(scan.fwhm)}")
+        say(f"peak {_told_peak(scan)}, {half_width(scan.fwhm)}")
         told = "if the lobe is round in direction cosines and the scan reaches its end"
         say(f"total scatter {scan.total_scatter:.4f}, {told}")
     if output is not None:
         say(f"{output}: written")
 
 
+def _peak(scan: GoniometerScan | DirectionalScan) -> dict[str, float]:
+    """The peak [1/sr] with its error, and the largest value, which chance lifts, as plain data for JSON."""
+    value, error = scan_peak(scan)
+    return {"peak": value, "peak_error": error, "maximum": float(scan.bsdf.max())}
+
+
+def _told_peak(scan: GoniometerScan | DirectionalScan) -> str:
+    largest, (value, error) = float(scan.bsdf.max()), scan_peak(scan)
+    if error < ROUNDED * value:  # a quadrature
+        return counted(largest, "1/sr")
+    return measured_largest(value, error, largest, "1/sr")
+
+
 def _tell_directions(scan: DirectionalScan, sample: Path | None, output: Path | None, *, json: bool) -> None:
     if output is not None:
         scan.save(output)
-    peak = float(scan.bsdf.max())
     if json:
         print_json({
             "output": output,
             "sample": sample,
             "positions": scan.flux.size,
             "solid_angle": scan.solid_angle,
-            "peak": peak,
+            **_peak(scan),
             "notes": list(scan.notes),
         })  # fmt: skip
         return
@@ -226,6 +239,6 @@ def _tell_directions(scan: DirectionalScan, sample: Path | None, output: Path | 
     say(
         f"{scan.flux.size} positions in two dimensions, {scan.way} at {scan.incidence:g}°, Ω = {scan.solid_angle:.4g} sr"
     )
-    say(f"peak {counted(peak, '1/sr')}")
+    say(f"peak {_told_peak(scan)}")
     if output is not None:
         say(f"{output}: written")

@@ -50,10 +50,21 @@ def measured_peak(found: Intensity) -> str:
     >>> measured_peak(et.Intensity([0], [0, 60, 120, 180], [[50000.0, 50500, 49800, 50200]], 2000.0))
     '49400 ± 2000 cd (largest value 50500 cd, lifted by chance)'
     """
-    peak = measured(found.peak_intensity, found.peak_error, found.unit)
-    if not found.maximum - found.peak_intensity > 0.5 * found.peak_error:
-        return peak
-    return f"{peak} (largest value {counted(found.maximum, found.unit)}, lifted by chance)"
+    return measured_largest(found.peak_intensity, found.peak_error, found.maximum, found.unit)
+
+
+def measured_largest(value: float, error: float, largest: float, unit: str) -> str:
+    """What the largest of many values is without chance, and that value if chance lifts it by more than half of the error.
+
+    Examples
+    --------
+    >>> measured_largest(0.26, 0.04, 0.35, "1/sr"), measured_largest(0.26, 0.04, 0.27, "1/sr")
+    ('0.260 ± 0.040 1/sr (largest value 0.35 1/sr, lifted by chance)', '0.260 ± 0.040 1/sr')
+    """
+    told = measured(value, error, unit)
+    if not largest - value > 0.5 * error:
+        return told
+    return f"{told} (largest value {counted(largest, unit)}, lifted by chance)"
 
 
 def peak_line(found: Intensity) -> str:
