@@ -346,6 +346,7 @@ def test_forecasts_come_true(trial: Trial, curve: Forecast) -> None:
     assert 0.5 * low**0.5 < share < 0.5 * high**0.5, share
 
 
+@pytest.mark.slow
 def test_gains_are_differences_of_scores_on_the_other_half(trial: Trial, curve: Forecast) -> None:
     np.testing.assert_allclose(curve.rays, trial.N * np.array([1, 2, 4]) / 8)
     assert (curve.gains > 5 * curve.gain_errors).all()

@@ -98,6 +98,7 @@ def test_each_coordinate_is_uniform_under_its_distribution_function(
     assert stats.kstest(u, "uniform").pvalue > SIGNIFICANCE
 
 
+@pytest.mark.slow
 def test_all_coordinates_together(coordinates: tuple[LightField, Array]) -> None:
     """χ² over 8 × 4 × 4 × 8 cells, against too good a fit as well."""
     field, at = coordinates

@@ -89,6 +89,7 @@ def inside(lmap: et.LuminanceMap, inner: float, outer: float) -> npt.NDArray[np.
     return (r + half < outer) & ((r - half > inner) | (inner == 0))
 
 
+@pytest.mark.slow
 def test_each_ring_has_its_luminance(ring_map: et.LuminanceMap) -> None:
     """303 964, 67 547 and 20 264 cd/m² (eq. 2.9), times (1 + cos α)/2; three standard errors."""
     for inner, outer, truth in ((0, 10, 303_963.55), (10, 20, 67_547.46), (20, 30, 20_264.24)):
@@ -99,6 +100,7 @@ def test_each_ring_has_its_luminance(ring_map: et.LuminanceMap) -> None:
         assert error < 0.02 * truth
 
 
+@pytest.mark.slow
 def test_the_error_bars_cover(ring_map: et.LuminanceMap) -> None:
     """Share of pixels within one standard error against its exact value for Poisson counts; binomial, two-sided 1e-3."""
     hits, expected, variance = 0, 0.0, 0.0
