@@ -145,6 +145,7 @@ def test_rules_on_courses_that_are_known() -> None:
 # --- the diffusers of the thesis ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["SD1", "SD2", "SD3", "SD4"])
 def test_the_lobe_comes_back_better_than_by_the_rule_of_the_thesis(name: str) -> None:
     """A million photons: relative L2 error, total scatter, no negative values."""
