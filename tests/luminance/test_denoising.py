@@ -172,6 +172,16 @@ def test_errors_that_pixels_share_do_not_go_out() -> None:
     assert "err together" in together.notes[-1]
 
 
+def test_what_all_pixels_err_by_is_no_noise_of_counts() -> None:
+    """The map is smoothed as one whose pixels err by their own noise alone; what they have in common is added again."""
+    noisy = poisson_map(scene(14, 12), 8.0, 6, et.Screen(1.2, 1.4, 12, 14))
+    whole = np.hypot(noisy.standard_error, 0.2 * noisy.values)
+    shared = noisy.replace(standard_error=whole, common_error=0.2)
+    plain, common = (et.denoise_map(lmap, shifts=2) for lmap in (noisy, shared))
+    np.testing.assert_allclose(common.values, plain.values, rtol=1e-9)
+    np.testing.assert_allclose(common.standard_error, np.hypot(plain.standard_error, 0.2 * plain.values), rtol=1e-6)
+
+
 def test_refusals() -> None:
     noisy = poisson_map(np.ones((4, 4)), 5.0, 1, et.Screen(1, 1, 4, 4))
     with pytest.raises(ArgumentError, match="shifts"):

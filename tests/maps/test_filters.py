@@ -225,6 +225,25 @@ def test_errors_that_pixels_share_stay_as_they_are(name: str) -> None:
     np.testing.assert_allclose(twice.standard_error, filter_map(apart.replace(rays=shared.rays), name).standard_error)
 
 
+@pytest.mark.parametrize("name", ["weighted", "selective"])
+def test_what_all_pixels_err_by_stays(name: str) -> None:
+    """Maps that are 4 % too bright or too dark as a whole, each beside 1 % noise of its pixels: z values of the mean.
+
+    The sum of z² over 60 maps is χ²(60), at 1e-6 on both sides; errors that a mean makes less would be a third of it.
+    """
+    rng = np.random.default_rng(21)
+    truth, common, own = np.full((7, 8), 300.0), 0.04, 0.01
+    z = []
+    for _ in range(60):
+        values = truth * (1.0 + common * rng.normal()) * (1.0 + own * rng.normal(size=truth.shape))
+        noisy = make_map(values, math.hypot(common, own) * values, common_error=common)
+        filtered = filter_map(noisy, name, 3)
+        z.append((filtered.values[3, 4] - 300.0) / filtered.standard_error[3, 4])
+        assert filtered.common_error == common
+    low, high = stats.chi2.ppf([0.5e-6, 1 - 0.5e-6], 60)
+    assert low < (np.array(z) ** 2).sum() < high
+
+
 def test_pixels_of_a_light_field_err_together() -> None:
     field = make_field(SURFACES["plane"], seed=8, cells=(4, 4, 4, 4))
     seen = et.luminance_map(field, Observer(25, 0, 1000), Screen(1, 1, 3, 3))

@@ -135,6 +135,13 @@ def test_the_error_of_a_mean_is_its_spread() -> None:
     assert np.std(means, ddof=1) == pytest.approx(stated, rel=4 / math.sqrt(2 * 499))
 
 
+def test_what_pixels_have_in_common_counts_once() -> None:
+    """5 % in common beside 1 of each pixel's own: √(0.5² + 1²/n) for a mean of 10 over n pixels, down to one."""
+    lmap = make_map(np.full((4, 10), 10.0), math.hypot(1.0, 0.5)).replace(common_error=0.05)
+    for region, n in ((Region(-5, -4, 1, 2), 1), (Region(-5, 5, -2, 2), 40)):
+        assert region_statistics(lmap, region).mean_error_apart == pytest.approx(math.hypot(0.5, n**-0.5), rel=1e-12)
+
+
 def test_chance_lifts_the_largest_pixel_and_not_the_maximum_apart() -> None:
     """100 maps of 1 600 even pixels, each with its own error: the largest is 3.2 of them too large on average, what is
     stated of pixels that err apart less than half of one. One pixel that stands out keeps its value."""

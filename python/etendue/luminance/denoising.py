@@ -7,10 +7,13 @@ import numpy.typing as npt
 
 from etendue.denoising.smoothing import smooth_counts
 from etendue.errors import ArgumentError
-from etendue.luminance.filters import TOGETHER, pixels_err_together
+from etendue.luminance.filters import TOGETHER, errors_apart, pixels_err_together
 from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map, notes_that_stay
 
 Array = npt.NDArray[np.float64]
+
+LEAST_SHARE = 1e-6
+"""Of a pixel's error that is taken for its own, where all of it is in common with the others."""
 
 
 def denoise_map(lmap: LuminanceMap, shifts: int = 16, threads: int | None = None) -> LuminanceMap:
@@ -37,9 +40,10 @@ def denoise_map(lmap: LuminanceMap, shifts: int = 16, threads: int | None = None
     LuminanceMap
         Every pixel has a value above 0. The flux Σ L · étendue is that of the input exactly. `standard_error` is
         calibrated on counts drawn from a known map much like this one (theory eq. 36): one standard error covers about
-        68 % of the pixels, two about 95 %, fewer where structure is too fine for the rays to show. Errors of neighbouring
-        pixels are correlated. Maps of fewer than 16 pixels a side or 100 effective rays are left to the trees alone, with
-        errors on the safe side. `rays` is that of the input.
+        68 % of the pixels, two about 95 %, fewer where structure is too fine for the rays to show; what all pixels have in
+        common, `LuminanceMap.common_error`, is added. Errors of neighbouring pixels are correlated. Maps of fewer than 16
+        pixels a side or 100 effective rays are left to the trees alone, with errors on the safe side. `rays` is that of the
+        input.
 
     Raises
     ------
@@ -66,11 +70,14 @@ def denoise_map(lmap: LuminanceMap, shifts: int = 16, threads: int | None = None
     etendue = lmap.screen.cosine(lmap.observer)  # relative: constant factors cancel
     smooth = smooth_counts(*_poisson_sums(lmap, etendue), etendue, shifts=shifts, threads=threads)
     error, notes = smooth.standard_error / etendue, (*notes_that_stay(lmap), *smooth.notes)
+    values = smooth.mass / etendue
     if pixels_err_together(lmap):
         error = np.fmax(error, lmap.standard_error)
         notes = (*notes, TOGETHER)
+    else:
+        error = np.hypot(error, lmap.common_error * values)
     return lmap.replace(
-        values=smooth.mass / etendue,
+        values=values,
         standard_error=error,
         provenance=lmap.provenance.then(f"denoised by trees, edges and rings, {shifts} shifts"),
         notes=notes,
@@ -91,4 +98,7 @@ def _poisson_sums(lmap: LuminanceMap, etendue: Array) -> tuple[Array, Array]:
             "denoise_map: the map has pixels without a standard error, so the counts behind them are not known. "
             "Denoise the map as it came from luminance_map, or from a file that holds errors (.exr .tif .npz .csv)."
         )
+    if not pixels_err_together(lmap):
+        # What all pixels err by in common is no noise of counts.
+        errors = np.fmax(np.where(live, errors_apart(lmap), 0.0), LEAST_SHARE * errors)
     return values * etendue, (errors * etendue) ** 2 * lit

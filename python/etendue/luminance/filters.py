@@ -110,7 +110,8 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     average; to leave the pixel out would lift its neighbours. A pixel stays dead where no ray came into the whole
     kernel. Eq. 2.6 selects nothing around a pixel that is dead or not above 0: it then keeps what it has.
 
-    *Standard errors.* σ²(g) = Σ w² σ²(f) for independent pixels of f, which those of the cone estimator are. Pixels of
+    *Standard errors.* σ²(g) = Σ w² σ²(f) for independent pixels of f, which those of the cone estimator are; what all pixels
+    have in common, `LuminanceMap.common_error`, stays what it is. Pixels of
     light fields, and of maps that were smoothed before, err together; of these it is σ(g) = Σ w σ(f), which no
     correlation exceeds, and a note says so. Of a scene the lines of sight are independent from pixel to pixel, and what
     a light field in it does not know is not. A pixel whose error is unknown makes the errors unknown of all that use it.
@@ -143,8 +144,9 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     if chosen.selective and not (math.isfinite(gamma) and gamma > 0.0):
         raise ArgumentError(f"filter_map: gamma is {gamma}; give a finite fraction > 0, such as 0.2.")
     row_weights, column_weights = _weights(rows, chosen.weighted), _weights(columns, chosen.weighted)
-    power = 1 if pixels_err_together(lmap) else 2
-    stack = _Stack.of(lmap, power)
+    together = pixels_err_together(lmap)
+    power, common = (1, 0.0) if together else (2, lmap.common_error)
+    stack = _Stack.of(lmap, lmap.standard_error if together else errors_apart(lmap) ** 2)
     if chosen.selective:
         filtered = _filter_selectively(stack, row_weights, column_weights, gamma, power)
         if power == 2:
@@ -153,6 +155,7 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     else:
         filtered = _filter_linearly(stack, row_weights, column_weights, power)
     label = f"{kind} {rows}×{columns}" + (f", γ = {gamma:g}" if chosen.selective else "")
+    filtered = dataclasses.replace(filtered, error=filtered.error + (common * filtered.value) ** 2)
     result = filtered.put_into(lmap, f"filter {label}", power)
     return result.replace(notes=(*notes_that_stay(lmap), *_report(lmap, result, label, chosen)))
 
@@ -170,6 +173,22 @@ def pixels_err_together(lmap: LuminanceMap) -> bool:
     # Rays are counted by the cone, and lines of sight are as independent; light fields count none.
     counted = lmap.rays[~np.isnan(lmap.values)] >= 0
     return not counted.any() or any(step.startswith(SMOOTHING) for step in lmap.provenance.steps)
+
+
+def errors_apart(lmap: LuminanceMap) -> Array:
+    """Standard errors of the pixels without what all of them have in common, `LuminanceMap.common_error`, shape of the map.
+
+    Examples
+    --------
+    >>> from etendue.quantities.observer import Observer, Screen
+    >>> lmap = LuminanceMap([[10.0]], [[0.5]], [[90]], Observer(0, 0, 1000), Screen(2, 1, 1, 1), common_error=0.03)
+    >>> errors_apart(lmap).round(9).tolist()
+    [[0.4]]
+    """
+    if not lmap.common_error:
+        return lmap.standard_error
+    apart: Array = np.sqrt(np.maximum(lmap.standard_error**2 - (lmap.common_error * lmap.values) ** 2, 0.0))
+    return apart
 
 
 def kernel(kind: str, size: int | tuple[int, int] = 5) -> Array:
@@ -239,11 +258,11 @@ class _Stack:
     """1 where the pixel is not dead."""
 
     @classmethod
-    def of(cls, lmap: LuminanceMap, power: int) -> _Stack:
+    def of(cls, lmap: LuminanceMap, error: Array) -> _Stack:
         dead = np.isnan(lmap.values)
         return cls(
             value=np.where(dead, 0.0, lmap.values),
-            error=np.where(dead, 0.0, lmap.standard_error**power),
+            error=np.where(dead, 0.0, error),
             rays=np.where(dead, 0, np.maximum(lmap.rays, 0)),
             unknown=(~dead & (lmap.rays < 0)).astype(np.int64),
             alive=(~dead).astype(np.int64),
