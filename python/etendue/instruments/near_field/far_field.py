@@ -38,6 +38,9 @@ Between two positions the lines are s²/12 of the second derivative too low on a
 FLUX_OF_TABLE = 5e-3
 """By which share the flux of a table may differ from that of the photometer without a note."""
 
+MISSED = 5e-3
+"""Share of the total flux that may be missed between positions without a note."""
+
 STEPS_PER_BEAM = 3.0
 """Positions that a beam should have within its width along γ."""
 
@@ -109,6 +112,36 @@ def step_notes(setting: Setting, values: Array) -> Iterator[str]:
                 f"the beam is {width:.3g}° wide {way}, and positions are {step:.3g}° apart: the total flux, and the scale "
                 "of the images with it, may be off by more than the stated error; take smaller steps"
             )
+
+
+def integral_notes(setting: Setting, illuminance: Array, errors: Array) -> Iterator[str]:
+    """What is to be said of light that changes too fast between positions for the total flux.
+
+    Parameters
+    ----------
+    setting : Setting
+        Of the measurement.
+    illuminance, errors : array, shape (n,)
+        By the photometer at each position, and its standard error.
+
+    Examples
+    --------
+    >>> from etendue.instruments.near_field.camera import Camera
+    >>> from etendue.instruments.near_field.positions import ArmPositions
+    >>> stops = ArmPositions(5, 10)
+    >>> setting = Setting(stops, Camera(8), 100.0, 100.0, 5.0, (0.0, 0.0, 0.0), 4.0)
+    >>> cut = (stops.gamma < 52) * np.cos(np.radians(stops.gamma))
+    >>> next(integral_notes(setting, cut, 0 * cut))
+    'the light changes much between positions: the total flux, and the scale of the images with it, may be off by some ...'
+    """
+    stops = setting.positions
+    total = float(stops.weight @ illuminance)
+    missed = stops.missed(illuminance, errors)
+    if missed > MISSED * total:
+        yield (
+            "the light changes much between positions: the total flux, and the scale of the images with it, may be off by "
+            f"some {missed / total:.1%}, which the stated error does not hold; take smaller steps"
+        )
 
 
 def linear_notes(setting: Setting, values: Array) -> Iterator[str]:

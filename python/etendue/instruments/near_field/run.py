@@ -15,7 +15,13 @@ import numpy.typing as npt
 from etendue.description.values import is_number
 from etendue.errors import ArgumentError
 from etendue.formats.input import as_path
-from etendue.instruments.near_field.far_field import far_field_notes, linear_notes, step_notes, table_notes
+from etendue.instruments.near_field.far_field import (
+    far_field_notes,
+    integral_notes,
+    linear_notes,
+    step_notes,
+    table_notes,
+)
 from etendue.instruments.near_field.merging import Merging, stretches
 from etendue.instruments.near_field.pixel_rays import PixelRays, in_blocks
 from etendue.instruments.near_field.setting import Setting, counts_dtype
@@ -110,7 +116,8 @@ class NearFieldRun:
     def total_flux_error(self) -> float:
         """Standard error of `total_flux` by that of the readings [`flux_unit`].
 
-        What the integral misses between positions is not in it; `notes` tell where a beam is too narrow for their steps.
+        What the integral misses between positions is not in it; `notes` tell where a beam is too narrow for their steps, or
+        the light changes too much between them.
         """
         square = self.setting.photometer_distance**2 / MM2_PER_M2
         return float(np.linalg.norm(self.setting.positions.weight * self.illuminance_error)) * square
@@ -125,7 +132,7 @@ class NearFieldRun:
         stops = self.setting.positions
         square = self.setting.photometer_distance**2 / MM2_PER_M2
         values = stops.table(self.illuminance) * square
-        told = (*far_field_notes(self.setting, values), *step_notes(self.setting, values))
+        told = (*far_field_notes(self.setting, values), *self._integral_notes)
         table = Intensity(
             stops.planes,
             stops.rings,
@@ -297,8 +304,13 @@ class NearFieldRun:
             told.append(
                 f"how much longer an exposure is than the one before is known of exposure {which}: few pixels show in both"
             )
-        told += step_notes(self.setting, self.setting.positions.table(self.illuminance))
-        return tuple(told)
+        return (*told, *self._integral_notes)
+
+    @cached_property
+    def _integral_notes(self) -> tuple[str, ...]:
+        """What may be wrong with the total flux."""
+        narrow = tuple(step_notes(self.setting, self.setting.positions.table(self.illuminance)))
+        return narrow or tuple(integral_notes(self.setting, self.illuminance, self.illuminance_error))
 
     # --- rays --------------------------------------------------------------------------------------------------------
 
