@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from etendue.quantities.angle_table import even_hats, gaps_of, hat_halves, hat_integrals
+from etendue.quantities.angle_table import gaps_of, hat_halves, hat_integrals
+from etendue.quantities.hat_sums import Hats, HatSums
 from etendue.quantities.intensity_nodes import Nodes, check_steps, planes_of
 from etendue.quantities.ray_stream import flux_power
 from etendue.quantities.smooth_light import Harmonics, nodes_around, parts_of
@@ -243,6 +244,7 @@ class _Tree:
         span, step = (180.0, GAMMA_STEP) if axis == "gamma" else (TURN, TURN)
         parts = np.zeros((gamma.size, round(span / step)))
         certain, likely = [], []
+        hats = Hats.of(angle, weight, row, gamma.size, span, round(span / step), DEPTH[axis])
         for level in range(DEPTH[axis]):
             size = round(span / step) << level
             if size * gamma.size > MOST_TESTED:
@@ -250,7 +252,7 @@ class _Tree:
             if axis == "c" and size <= FEW_NODES:
                 change = _modulation(angle, weight, row, gamma.size, size)
             else:
-                change = _change(angle, weight, row, gamma.size, size, axis)
+                change = _change(hats.sums(size))
             if not change.any():
                 break
             # Steps of C that are narrower than the finest ones of γ at their γ do not count.
@@ -344,45 +346,14 @@ class _Tree:
         return [tuple(nodes.tolist()) for nodes in np.split(angle[order], ends)]
 
 
-def _change(angle: Array, weight: Array, row: Counts, rows: int, size: int, axis: str) -> Array:
+def _change(sums: HatSums) -> Array:
     """How much the value at each node changes if all steps are halved, in standard errors; shape (rows, nodes).
 
     It is 0 where there are too few rays; the error is so large that a change of no consequence is none.
     """
-    span = 180.0 if axis == "gamma" else TURN
-    step, nodes = span / size, size + 1 if axis == "gamma" else size
-    wide: Array | float = step
-    narrow: Array | float = step / 2.0
-    if axis == "gamma":
-        wide, narrow = even_hats(size)
-    place = angle / step
-    first = np.minimum(place.astype(np.intp), size - 1)
-    on = np.subtract(place, first, out=place)
-    second = first + 1
-    second[second == nodes] = 0
-    row = row * nodes
-    sums = np.zeros((4, rows * nodes))
-    # The values of many rays are made in the same places: fresh ones take as long as what is reckoned.
-    hat, other = 1.0 - on, np.zeros(on.shape)
-    for node in (first, second):
-        if node is second:
-            hat = on
-        half = np.maximum(np.subtract(np.multiply(hat, 2.0, out=other), 1.0, out=other), 0.0, out=other)
-        half /= narrow if isinstance(narrow, float) else narrow[node]
-        half -= hat / (wide if isinstance(wide, float) else wide[node])
-        half *= weight
-        index = row + node
-        sums[0] += np.bincount(index, half, rows * nodes)
-        half *= half
-        sums[3] += np.bincount(index, half, rows * nodes)
-        w = np.multiply(weight, hat, out=half)
-        sums[1] += np.bincount(index, w, rows * nodes)
-        w *= w
-        sums[2] += np.bincount(index, w, rows * nodes)
-    change, held, squares, variance = sums.reshape(4, rows, nodes)
-    value = held / wide
-    fewest = np.where(change > 0.0, FEW, FEWEST)
-    return _in_errors(change, np.sqrt(variance), value, _equal(held, squares), fewest)
+    value, error = sums.held / sums.wide, np.sqrt(sums.variance)
+    fewest = np.where(sums.change > 0.0, FEW, FEWEST)
+    return _in_errors(sums.change, error, value, _equal(sums.held, sums.squares), fewest)
 
 
 def _modulation(angle: Array, weight: Array, row: Counts, rows: int, size: int) -> Array:
