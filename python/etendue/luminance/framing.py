@@ -16,6 +16,7 @@ from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
+from etendue.quantities.vectors import lengths
 from etendue.scene import Scene, compile_scene
 from etendue.scene.compiling import Compiled
 from etendue.scene.framing import corners_of, framed_screen
@@ -102,9 +103,7 @@ def light_towards(rays: RaySet, observer: Observer, screen: Screen) -> Light:
     away = rays.position - np.asarray(rays.virtual_focus.point)
     start = rays.position - np.einsum("ij,ij->i", away, direction)[:, None] * direction
     towards = observer.position - start
-    cosine = np.einsum("ij,ij->i", towards, direction) / np.maximum(
-        np.linalg.norm(towards, axis=1), np.finfo(float).tiny
-    )
+    cosine = np.einsum("ij,ij->i", towards, direction) / np.maximum(lengths(towards), np.finfo(float).tiny)
     cone = next((a for a in CONES if (cosine > np.cos(np.radians(a))).sum() >= ENOUGH), CONES[-1])
     heading = cosine > np.cos(np.radians(cone))
     start, direction = start[heading] - np.asarray(observer.target), direction[heading]
@@ -233,7 +232,7 @@ def centre_of_light(rays: RaySet) -> tuple[float, float, float]:
     (3.0, 0.0, 7.0)
     """
     point = np.array(rays.virtual_focus.point)
-    off = np.linalg.norm(np.cross(rays.position - point, rays.direction), axis=1)
+    off = lengths(np.cross(rays.position - point, rays.direction))
     step = 10.0 ** np.floor(np.log10(max(_quantile(off, rays.flux), 1e-6))) / 10.0
     x, y, z = np.round(point / step) * step + 0.0
     return (float(f"{x:.12g}"), float(f"{y:.12g}"), float(f"{z:.12g}"))
@@ -259,7 +258,7 @@ def beyond_notes(rays: RaySet, observer: Observer, screen: Screen) -> tuple[str,
     crossing = _crossing(start, direction, normal)
     on_screen = (np.abs(crossing @ right) <= screen.width / 2) & (np.abs(crossing @ up) <= screen.height / 2)
     towards = observer.position - np.asarray(observer.target) - crossing
-    cosine = np.einsum("ij,ij->i", towards, direction) / np.linalg.norm(towards, axis=1)
+    cosine = np.einsum("ij,ij->i", towards, direction) / lengths(towards)
     seen = (on_screen & (cosine > np.cos(np.radians(cone))) for cone in CONES)
     shown = next(
         (some for some in seen if some.sum() >= FEW_SEEN), on_screen & (cosine > np.cos(np.radians(CONES[-1])))
@@ -283,7 +282,7 @@ def missed_notes(rays: RaySet, observer: Observer, screen: Screen) -> tuple[str,
     Nothing from within the source: there the light comes from all sides, and no screen shows most of it.
     """
     middle = centre_of_light(rays)
-    from_middle = np.linalg.norm(rays.position - np.asarray(middle), axis=1)
+    from_middle = lengths(rays.position - np.asarray(middle))
     if np.linalg.norm(observer.position - np.asarray(middle)) < _quantile(from_middle, rays.flux):
         return ()
     light = light_towards(rays, observer, screen)
@@ -301,6 +300,10 @@ def missed_notes(rays: RaySet, observer: Observer, screen: Screen) -> tuple[str,
 
 def _quantile(values: Array, weights: Array) -> float:
     """The value that the share `SHOWN` of the weights does not exceed."""
+    if (weights == weights[0]).all():  # which need not be put into the order of the values, and that takes longest
+        summed = np.cumsum(weights)
+        rank = min(int(np.searchsorted(summed, SHOWN * summed[-1])), len(values) - 1)
+        return float(np.partition(values, rank)[rank])
     order = np.argsort(values)
     summed = np.cumsum(weights[order])
     return float(values[order][min(np.searchsorted(summed, SHOWN * summed[-1]), len(order) - 1)])

@@ -250,6 +250,6 @@ def projected_solid_angles(points: Array) -> Array:
     counts = np.zeros(len(points))
     step = max(1, (1 << 22) // len(points))
     for start in range(0, LATTICE, step):
-        apart = np.sum((beta[start : start + step, None] - points[:, :2]) ** 2, axis=-1)
-        np.add.at(counts, apart.argmin(axis=1), 1.0)
+        x, y = (beta[start : start + step, None, axis] - points[:, axis] for axis in (0, 1))
+        counts += np.bincount((x * x + y * y).argmin(axis=1), minlength=len(points))
     return np.asarray(counts * (math.pi / LATTICE))
