@@ -28,7 +28,8 @@ class UnknownNameError(EtendueError, ValueError):
         near = nearest_name(name, choices) if isinstance(name, str) else None
         hint = f" Did you mean {near!r}?" if near else ""
         self.kind, self.name, self.known = kind, name, choices
-        super().__init__(f"unknown {kind} {name!r}.{hint} Known: {', '.join(choices)}.")
+        told = f"Known: {', '.join(choices)}." if choices else "There is none."
+        super().__init__(f"unknown {kind} {name!r}.{hint} {told}")
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle, which would give the message alone."""

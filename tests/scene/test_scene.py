@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import tomllib
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 
 import etendue as et
 import pytest
-from etendue.errors import SceneError
+from etendue.errors import ArgumentError, SceneError
 from etendue.scene import Scene, compile_scene
 from etendue.scene.toml import to_toml
 from hypothesis import given
@@ -370,3 +371,31 @@ def test_thousands_of_mistakes_are_told_in_part() -> None:
     assert lines[1].startswith('  solids[0] "b0": shape.radius')
     assert len(lines) == 52
     assert lines[-1] == "  and 1,950 more"
+
+
+def test_mistakes_that_show_when_a_scene_is_compiled_name_its_file(tmp_path: Path) -> None:
+    """Also of scenes that are the same as one that was read, with other values; equal scenes stay equal."""
+    path = tmp_path / "hall.toml"
+    path.write_text('name = "hall"\n[[detectors]]\nkind = "image"\nobserver = "eye"\n', encoding="utf-8")
+    scene = Scene.load(path)
+    for one in (scene, scene.replace(name="other"), copy.deepcopy(scene)):
+        with pytest.raises(SceneError, match=r"hall\.toml: detectors\[0\]: unknown observer 'eye'\. There is none\."):
+            compile_scene(one)
+    with pytest.raises(ArgumentError, match=r"hall\.toml: there is no source"):
+        et.trace(scene.replace(detectors=[]), rays=100)
+    alike = Scene.from_dict(scene.to_dict(), folder=tmp_path)
+    assert scene == alike
+    with pytest.raises(SceneError, match=r"^hall: detectors"):
+        compile_scene(alike)
+
+
+def test_a_wrong_value_in_a_row_is_one_mistake() -> None:
+    """The row is not called too short because of it; an empty one is."""
+    point = {"kind": "point", "flux": 1}
+    with pytest.raises(SceneError) as told:
+        Scene(sources=[point | {"spectrum": [[450, -1], [500, 2]]}])
+    assert told.value.mistakes == (("sources[0].spectrum[0][1]", "is -1; it must be at least 0"),)
+    with pytest.raises(SceneError, match="spectrum: has 0 values; it must have 1 at least"):
+        Scene(sources=[point | {"spectrum": []}])
+    with pytest.raises(SceneError, match="vertices: has 2 values; it must have 3 at least"):
+        Scene(surfaces=[{"shape": {"kind": "polygon", "vertices": [[0, 0], [1, 0]]}, "finish": "mirror"}])

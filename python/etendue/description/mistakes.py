@@ -28,6 +28,9 @@ def mistakes_of(error: ValidationError, data: Any) -> list[tuple[str, str]]:
     """
     mistakes: list[tuple[str, str]] = []
     for details in error.errors():
+        # A row with a wrong value is too short for pydantic, which leaves that one out; it is told by itself.
+        if details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]:
+            continue
         place = place_of(details["loc"], data)
         cause = details.get("ctx", {}).get("error")
         if isinstance(cause, SceneError):
@@ -98,6 +101,10 @@ def sentence(details: Mapping[str, Any]) -> str:
             return f"is {found}; it must be at least {context['ge']:g}"
         case "less_than_equal":
             return f"is {found}; it must be at most {context['le']:g}"
+        case "too_short":
+            return f"has {len(details['input'])} values; it must have {context['min_length']} at least"
+        case "too_long":
+            return f"has more than {context['max_length']:,} values, which is the most"
         case "finite_number":
             return f"is {found}; it must be finite"
         case "unknown_kind":

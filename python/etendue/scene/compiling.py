@@ -157,7 +157,7 @@ class _Compiler:
         self._check_colours()
         self._check_far_fields()
         if self.mistakes:
-            raise SceneError(self.scene.name or "scene", self.mistakes)
+            raise SceneError(self.scene.called, self.mistakes)
         record = {**self.rows, "faces": self.faces.rows()}
         for doubt in doubts_about(record, self.kinds, self.names["sources"]):
             self._doubt(doubt, 4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -46,6 +47,13 @@ def _not_too_many(value: Any) -> Any:
 
 NotTooMany = BeforeValidator(_not_too_many)
 """Looks at the length before the mistakes in millions of entries are told one by one."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ReadFrom:
+    """The file that a scene was read from: what messages call it. Scenes that differ in this alone are equal."""
+
+    file: str = dataclasses.field(default="", compare=False)
 
 
 class Scene(Description, InNotebook):
@@ -95,6 +103,7 @@ class Scene(Description, InNotebook):
     detectors: Annotated[tuple[AnyDetector, ...], MaxLen(MOST), NotTooMany, AsRow] = Field(default=())
     observers: Annotated[tuple[ObserverKeys, ...], MaxLen(MOST), NotTooMany, AsRow] = Field(default=())
     _folder: Path = PrivateAttr(default=Path())
+    _read_from: ReadFrom = PrivateAttr(default_factory=ReadFrom)
 
     def __repr__(self) -> str:
         """Name, and how much of what there is."""
@@ -136,6 +145,17 @@ class Scene(Description, InNotebook):
         return tuple(self.files.find(name) for name in _named_files(self.to_dict()))
 
     @property
+    def called(self) -> str:
+        """What messages call the scene: the file that it was read from, else its name.
+
+        Examples
+        --------
+        >>> Scene(name="hall").called, Scene.from_dict({"name": "hall"}, source="hall.toml").called, Scene().called
+        ('hall', 'hall.toml', 'scene')
+        """
+        return self._read_from.file or self.name or "scene"
+
+    @property
     def files(self) -> Files:
         """Where files are looked for that the scene names with a relative path."""
         return Files(self._folder)
@@ -165,7 +185,8 @@ class Scene(Description, InNotebook):
             scene = cls.model_validate(dict(data))
         except ValidationError as error:
             raise SceneError(source, mistakes_of(error, data)) from None
-        return scene._at(as_path(folder))  # noqa: SLF001 - an alternative constructor
+        read_from = ReadFrom("" if source == "scene" else str(source))
+        return scene._at(as_path(folder), read_from)  # noqa: SLF001 - an alternative constructor
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -251,10 +272,10 @@ class Scene(Description, InNotebook):
         >>> Scene(name="a").replace(name="b").name
         'b'
         """
-        return super().replace(**changes)._at(self._folder)  # noqa: SLF001 - its own kind
+        return super().replace(**changes)._at(self._folder, self._read_from)  # noqa: SLF001 - its own kind
 
-    def _at(self, folder: Path) -> Self:
-        self._folder = folder
+    def _at(self, folder: Path, read_from: ReadFrom) -> Self:
+        self._folder, self._read_from = folder, read_from
         return self
 
 

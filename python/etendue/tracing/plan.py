@@ -133,7 +133,7 @@ def make_plan(
         If a number is out of its range, or the detectors have too many cells.
     """
     if not compiled.record["sources"]:
-        raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to trace.")
+        raise ArgumentError(f"{scene.called}: there is no source, and nothing to trace; add one under [[sources]].")
     count, notes = _rays(compiled, rays)
     seed = checked_seed(seed)
     if isinstance(most_events, bool) or not (isinstance(most_events, int) and 1 <= most_events <= MOST_EVENTS):
