@@ -349,8 +349,9 @@ def test_what_the_comparison_leaves_open_is_in_the_errors() -> None:
     assert (lmap.standard_error[lit] > 0.98 * common * lmap.values[lit]).all()
     assert lmap.common_error == pytest.approx(common, rel=0.05)  # the note has two digits
     whole = et.region_statistics(lmap, et.Region(-99, 99, -99, 99))
-    apart = np.sqrt((lmap.standard_error**2).sum()) / lmap.values.size
-    assert whole.mean_error_apart == pytest.approx(math.hypot(apart, lmap.common_error * whole.mean), rel=1e-12)
+    shared = np.minimum(lmap.common_error * lmap.values, lmap.standard_error)
+    apart = np.sqrt((lmap.standard_error**2 - shared**2).sum()) / lmap.values.size
+    assert whole.mean_error_apart == pytest.approx(math.hypot(apart, shared.mean()), rel=1e-12)
     assert looked_into(rays_per_pixel=16, gather=False).common_error == 0.0
     table = et.sweep(
         cup(), {"side.finish.reflectance": [0.95]}, ["mean", "intensity"], *INTO, rays_per_pixel=LINES, seed=5

@@ -250,6 +250,22 @@ def test_pixels_of_a_light_field_err_together() -> None:
     assert "err together" in filter_map(seen, "average").notes[-1]
 
 
+def test_what_a_light_field_in_a_scene_does_not_know_stays() -> None:
+    """The same pixels by lines of sight through a scene and from the field in it: one error, which no mean makes less.
+
+    Where a line of sight meets the surface is drawn, so that the two differ by a hundredth.
+    """
+    field = make_field(SURFACES["plane"], seed=8, cells=(4, 4, 4, 4))
+    eye, screen = Observer(25, 0, 1000), Screen(1, 1, 6, 6)
+    direct = et.luminance_map(field, eye, screen)
+    scene = et.Scene(sources=[{"kind": "light-field", "field": field}])
+    seen = et.luminance_map(scene, eye, screen, rays_per_pixel=256, seed=1)
+    assert seen.common_error == pytest.approx(direct.relative_error.flux_weighted, rel=0.02)  # type: ignore[union-attr]
+    for smooth in (filter_map(seen, "average"), et.denoise_map(seen)):
+        assert smooth.relative_error.flux_weighted > 0.9 * seen.common_error  # type: ignore[union-attr]
+    assert "in common, of which means take nothing" in filter_map(seen, "average").notes[-1]
+
+
 SLOPE = np.add.outer(np.arange(40), 2 * np.arange(36))
 
 

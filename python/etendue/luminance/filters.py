@@ -110,11 +110,11 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     average; to leave the pixel out would lift its neighbours. A pixel stays dead where no ray came into the whole
     kernel. Eq. 2.6 selects nothing around a pixel that is dead or not above 0: it then keeps what it has.
 
-    *Standard errors.* σ²(g) = Σ w² σ²(f) for independent pixels of f, which those of the cone estimator are; what all pixels
-    have in common, `LuminanceMap.common_error`, stays what it is. Pixels of
-    light fields, and of maps that were smoothed before, err together; of these it is σ(g) = Σ w σ(f), which no
-    correlation exceeds, and a note says so. Of a scene the lines of sight are independent from pixel to pixel, and what
-    a light field in it does not know is not. A pixel whose error is unknown makes the errors unknown of all that use it.
+    *Standard errors.* σ²(g) = Σ w² σ²(f) for independent pixels of f, which those of the cone estimator are. Pixels of light
+    fields, and of maps that were smoothed before, err together; of these it is σ(g) = Σ w σ(f), which no correlation
+    exceeds, and a note says so. Of a scene the lines of sight are independent from pixel to pixel, and what the map says
+    that its pixels have in common (`LuminanceMap.common_error`), as what a light field in it does not know, is added up
+    likewise. A pixel whose error is unknown makes the errors unknown of all that use it.
     Dead pixels add nothing, although a pixel without rays is not known exactly. For the selective filters the noise itself
     decides on the selection, so that of independent pixels the error is made by drawing the map 24 times about g (6 to 24
     times beyond a million pixels) with the noise of f, always the same draws, and filtering these maps: what comes out
@@ -143,19 +143,18 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     rows, columns = _kernel_size(size)
     if chosen.selective and not (math.isfinite(gamma) and gamma > 0.0):
         raise ArgumentError(f"filter_map: gamma is {gamma}; give a finite fraction > 0, such as 0.2.")
-    row_weights, column_weights = _weights(rows, chosen.weighted), _weights(columns, chosen.weighted)
+    weights = _weights(rows, chosen.weighted), _weights(columns, chosen.weighted)
     together = pixels_err_together(lmap)
-    power, common = (1, 0.0) if together else (2, lmap.common_error)
+    power, width = (1 if together else 2), (gamma if chosen.selective else None)
     stack = _Stack.of(lmap, lmap.standard_error if together else errors_apart(lmap) ** 2)
-    if chosen.selective:
-        filtered = _filter_selectively(stack, row_weights, column_weights, gamma, power)
-        if power == 2:
-            variance = _redrawn_variance(stack, filtered, (row_weights, column_weights), gamma, _draws(lmap))
-            filtered = dataclasses.replace(filtered, error=variance)
-    else:
-        filtered = _filter_linearly(stack, row_weights, column_weights, power)
+    filtered = _filter(stack, weights, width, power)
+    if chosen.selective and not together:
+        variance = _redrawn_variance(stack, filtered, weights, gamma, _draws(lmap))
+        filtered = dataclasses.replace(filtered, error=variance)
+    if lmap.common_error and not together:
+        shared = _filter(_Stack.of(lmap, errors_in_common(lmap)), weights, width, 1)
+        filtered = dataclasses.replace(filtered, error=filtered.error + shared.error**2)
     label = f"{kind} {rows}×{columns}" + (f", γ = {gamma:g}" if chosen.selective else "")
-    filtered = dataclasses.replace(filtered, error=filtered.error + (common * filtered.value) ** 2)
     result = filtered.put_into(lmap, f"filter {label}", power)
     return result.replace(notes=(*notes_that_stay(lmap), *_report(lmap, result, label, chosen)))
 
@@ -175,8 +174,23 @@ def pixels_err_together(lmap: LuminanceMap) -> bool:
     return not counted.any() or any(step.startswith(SMOOTHING) for step in lmap.provenance.steps)
 
 
+def errors_in_common(lmap: LuminanceMap) -> Array:
+    """What of the pixels' standard errors they have in common, `LuminanceMap.common_error`; shape of the map.
+
+    Examples
+    --------
+    >>> from etendue.quantities.observer import Observer, Screen
+    >>> lmap = LuminanceMap([[10.0, 9.0]], [[0.5, 0.1]], [[90, 90]], Observer(0, 0, 1000), Screen(2, 1, 2, 1),
+    ...                     common_error=0.03)
+    >>> errors_in_common(lmap).round(9).tolist()
+    [[0.3, 0.1]]
+    """
+    shared: Array = np.minimum(lmap.common_error * np.abs(lmap.values), lmap.standard_error)
+    return shared
+
+
 def errors_apart(lmap: LuminanceMap) -> Array:
-    """Standard errors of the pixels without what all of them have in common, `LuminanceMap.common_error`, shape of the map.
+    """Standard errors of the pixels without what they have in common, shape of the map.
 
     Examples
     --------
@@ -187,7 +201,7 @@ def errors_apart(lmap: LuminanceMap) -> Array:
     """
     if not lmap.common_error:
         return lmap.standard_error
-    apart: Array = np.sqrt(np.maximum(lmap.standard_error**2 - (lmap.common_error * lmap.values) ** 2, 0.0))
+    apart: Array = np.sqrt(np.maximum(lmap.standard_error**2 - errors_in_common(lmap) ** 2, 0.0))
     return apart
 
 
@@ -278,6 +292,14 @@ class _Stack:
         )
 
 
+def _filter(stack: _Stack, weights: tuple[Array, Array], gamma: float | None, power: int) -> _Stack:
+    """With the kernel of these weights along rows and columns; selectively if there is a `gamma`."""
+    if gamma is None:
+        return _filter_linearly(stack, *weights, power)
+    means = _selected_means(stack.value, dataclasses.asdict(stack), weights, gamma, power)
+    return _Stack(**means, alive=stack.alive)
+
+
 def _filter_linearly(stack: _Stack, row_weights: Array, column_weights: Array, power: int) -> _Stack:
     """Eq. 2.5 with a kernel that is an outer product: first down the columns, then along the rows."""
 
@@ -303,12 +325,6 @@ def _correlate(array: ArrayOrCounts, weights: Array) -> ArrayOrCounts:
         here, there = _overlap(offset, len(array), 0, len(array))
         result[here] += array.dtype.type(weight) * array[there]
     return result
-
-
-def _filter_selectively(stack: _Stack, row_weights: Array, column_weights: Array, gamma: float, power: int) -> _Stack:
-    """Fig. 2.4."""
-    means = _selected_means(stack.value, dataclasses.asdict(stack), (row_weights, column_weights), gamma, power)
-    return _Stack(**means, alive=stack.alive)
 
 
 def _draws(lmap: LuminanceMap) -> int:
@@ -404,6 +420,8 @@ def _report(before: LuminanceMap, after: LuminanceMap, label: str, kind: FilterK
     yield f"{label}: intensity {rounded(old)} → {counted(new, unit)}{change}{dead}"
     if pixels_err_together(before) and np.isfinite(before.standard_error).any():
         yield f"{label}: {TOGETHER}"
+    if before.common_error and not pixels_err_together(before):
+        yield f"{label}: pixels have an error of {before.common_error:.2%} in common, of which means take nothing"
     if kind.selective and np.isfinite(before.standard_error).any():
         if pixels_err_together(before):
             yield f"{label}: standard errors are optimistic, because the noise itself selected the pixels that are averaged"

@@ -127,6 +127,14 @@ class Passes:
         found = RelativeError.of(*self.total(image, known=False), self._area)
         return 0.0 if found is None else found.flux_weighted
 
+    def stated_error(self, image: Forward | None) -> float:
+        """What the sources state of their own error over the luminance, weighted by flux; 0 if there is no light.
+
+        A light field errs alike in neighbouring pixels, however many lines of sight look at it.
+        """
+        light = float((self.total(image)[0] * self._area).sum())
+        return float((self._whole(self._deviation) * self._area).sum()) / light if light > 0.0 else 0.0
+
     def wanted(self, until: float, most: int, image: Forward | None) -> int:
         """Passes that should be made to reach a relative error: as many as its fall with 1/√n asks for, twice at most."""
         error = self.relative_error(image)

@@ -145,12 +145,13 @@ def region_statistics(
     counted = inside if dead == "zero" else live
     values, errors = (np.where(lit, array, 0.0)[counted] for array in (lmap.values, lmap.standard_error))
     common = lmap.common_error if isinstance(lmap, LuminanceMap) else 0.0
-    own = np.sqrt(np.maximum(errors**2 - (common * values) ** 2, 0.0))
+    shared = np.minimum(common * values, errors)
+    own = np.sqrt(np.maximum(errors**2 - shared**2, 0.0))
     mean, low, high = float(values.mean()), float(values.min()), float(values.max())
     return RegionStatistics(
         mean=mean,
         mean_error=float(errors.mean()),
-        mean_error_apart=math.hypot(float(np.sqrt((own**2).sum()) / own.size), common * mean),
+        mean_error_apart=math.hypot(float(np.sqrt((own**2).sum()) / own.size), float(shared.mean())),
         minimum=low,
         maximum=high,
         maximum_apart=unlifted(values, np.nan_to_num(errors), np.ones(values.size)).value,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Literal
@@ -190,7 +191,7 @@ def look_at_scene(
                 compiled.flux_unit,
                 seen.origin.then(f"luminance by {paths:,} lines of sight per pixel, seed {how.seed}"),
                 (*told, *notes),
-                common,
+                math.hypot(common, passes.stated_error(image)),
             )
         )
     return maps

@@ -41,8 +41,9 @@ class LuminanceMap(PixelMap):
     notes : tuple of str
         What the user should know: method, acceptance and why, dead pixels, skipped rays.
     common_error : float
-        Standard error that all pixels have in common, relative to the luminance; it is part of `standard_error`, and does
-        not become less in means over pixels. 0 where none is known.
+        Standard error that pixels have in common, relative to the luminance; of each it is part of `standard_error`, and no
+        more than that. It does not become less in means over pixels. Of a scene with light fields in it, what these do not
+        know is such an error, weighted by flux. 0 where none is known.
 
     Raises
     ------

@@ -494,4 +494,5 @@ def _sum_error(step: Step, found: LuminanceMap, terms: Array, errors: Array) -> 
     known = np.nan_to_num(errors)
     if any(isinstance(source, Rays | Field | Gridded) for source in step.scene.sources):
         return float(known.sum())
-    return math.hypot(float(np.sqrt((known**2).sum())), found.common_error * float(np.nan_to_num(terms).sum()))
+    shared = np.minimum(found.common_error * np.abs(np.nan_to_num(terms)), known)
+    return math.hypot(math.sqrt(float((known**2 - shared**2).sum())), float(shared.sum()))
