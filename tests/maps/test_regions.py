@@ -149,6 +149,9 @@ def test_chance_lifts_the_largest_pixel_and_not_the_maximum_apart() -> None:
     found = [region_statistics(make_map(one), Region(-20, 20, -20, 20)) for one in draws]
     assert np.mean([one.maximum for one in found]) - 10.0 > 3.0 * 0.5
     assert abs(np.mean([one.maximum_apart for one in found]) - 10.0) < 0.5 * 0.5
+    # What pixels have in common lifts none above the others.
+    shared = make_map(draws[0]).replace(standard_error=0.05 * draws[0], common_error=0.05)
+    assert region_statistics(shared, Region(-20, 20, -20, 20)).maximum_apart == draws[0].max()
     draws[:, 3, 7] = 20.0
     assert region_statistics(make_map(draws[0]), Region(-20, 20, -20, 20)).maximum_apart == pytest.approx(
         20.0, abs=1e-6

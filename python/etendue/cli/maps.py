@@ -12,7 +12,7 @@ import numpy as np
 from etendue.cli.terminal import say
 from etendue.formats.maps import PICTURE_EXTENSIONS
 from etendue.formats.maps.map_format import AnyMap
-from etendue.luminance.filters import pixels_err_together
+from etendue.luminance.filters import errors_apart, pixels_err_together
 from etendue.luminance.region_statistics import RegionStatistics, region_statistics
 from etendue.luminance.regions import AnyRegion, parse_region
 from etendue.plot.colour_scale import Scale
@@ -124,7 +124,7 @@ def _largest_apart(lmap: LuminanceMap) -> float:
     values = lmap.values[live]
     if pixels_err_together(lmap):
         return float(values.max())
-    return unlifted(values, lmap.standard_error[live], np.ones(values.size)).value
+    return unlifted(values, errors_apart(lmap)[live], np.ones(values.size)).value
 
 
 def _maximum(lmap: LuminanceMap) -> str:

@@ -38,8 +38,8 @@ class RegionStatistics:
         The same if each pixel errs by itself, as those do that count rays: the root of the sum of squares over their number.
         What a map says that all its pixels err by in common is added to it.
     maximum_apart : float
-        The maximum less what chance lifts the largest of many pixels by, if each errs by itself
-        (`etendue.quantities.unlifted`), in `unit`. The minimum is lowered by chance likewise.
+        The maximum less what chance lifts the largest of many pixels by, if each errs by itself but for what they have in
+        common (`etendue.quantities.unlifted`), in `unit`. The minimum is lowered by chance likewise.
     percentiles : tuple of pairs
         Share [%] and value: the linear interpolation between ranked pixels.
     uniformity : float
@@ -154,7 +154,7 @@ def region_statistics(
         mean_error_apart=math.hypot(float(np.sqrt((own**2).sum()) / own.size), float(shared.mean())),
         minimum=low,
         maximum=high,
-        maximum_apart=unlifted(values, np.nan_to_num(errors), np.ones(values.size)).value,
+        maximum_apart=unlifted(values, np.nan_to_num(own), np.ones(values.size)).value,
         percentiles=tuple((float(share), float(np.percentile(values, share))) for share in percentiles),
         uniformity=low / mean if mean > 0.0 else math.nan,
         uniformity_of_extremes=low / high if high > 0.0 else math.nan,
