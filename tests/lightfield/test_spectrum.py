@@ -22,7 +22,7 @@ LINES, SHARES = np.array([450.0, 550.0, 633.0]), np.array([0.5, 0.3, 0.2])
 WHITE = Spectrum([420, 450, 480, 560, 700], [0.0, 1.0, 0.2, 0.7, 0.0])
 
 
-def rays(n: int = 20_000, **keys: Any) -> et.RaySet:
+def rays(n: int = 2000, **keys: Any) -> et.RaySet:
     """2 W from a disk that is brighter on one side, nearly Lambertian, in three lines unless told otherwise."""
     rng = np.random.default_rng(2)
     radius, turn = np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)

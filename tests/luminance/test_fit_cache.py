@@ -41,7 +41,7 @@ FLAT = et.Plane(z=0, focus=(0, 0, 0, 0))
 """A plane that no focus is sought for."""
 
 
-def led(seed: int = 1, n: int = 1000) -> et.RaySet:
+def led(seed: int = 1, n: int = 300) -> et.RaySet:
     rng = np.random.default_rng(seed)
     k = rng.normal((0.2, 0.1, 1.0), 0.5, (n, 3))
     k[:, 2] = np.abs(k[:, 2])
@@ -184,10 +184,13 @@ def test_a_field_that_cannot_be_removed_is_told(folder: Path) -> None:
         et.clear_cache()
 
 
-def test_a_folder_that_cannot_be_written_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_that_cannot_be_written_is_done_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fits: list[int]
+) -> None:
     (tmp_path / "file").write_text("no folder")
     monkeypatch.setenv(fit_cache.FOLDER_VARIABLE, str(tmp_path / "file" / "kept"))
     assert seen(led()).values.max() > 0
+    assert fits == [300]
 
 
 @pytest.mark.slow

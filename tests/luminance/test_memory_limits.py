@@ -18,7 +18,7 @@ GRID = {"name": "desk", "kind": "illuminance", "width": 9, "height": 9, "at": [0
 
 @pytest.fixture(scope="module")
 def sources() -> dict[str, Any]:
-    rings = et.RingSource(rays=20_000, seed=2)
+    rings = et.RingSource(rays=2000, seed=2)
     field = et.LightField.fit(rings, Disk(radius=30), depths=(2, 2, 2, 2))
     paper = {"name": "paper", "shape": {"kind": "disk", "radius": 50}, "at": [0, 0, -9], "finish": "white"}
     white = {"white": {"kind": "lambertian", "reflectance": 0.8}}

@@ -89,7 +89,7 @@ def test_watts_without_a_spectrum_become_lumens_through_the_colours_that_are_sta
         return et.LightField.fit(rays, et.Disk(radius=30), depths=(1, 1, 1, 1))
 
     monkeypatch.setattr(scene_map, "fit_or_recall", fitted)
-    grey = et.RingSource(rays=5000).ray_set().replace(flux_unit="W")
+    grey = et.RingSource(rays=500).ray_set().replace(flux_unit="W")
     field = fitted(grey)
     stated = sources.Field(field=field, flux_unit="lm", wavelength=500)
     assert source(stated)["flux"] == pytest.approx(field.total_flux * at[0])

@@ -128,11 +128,11 @@ def trace_rounds(
     --------
     >>> import etendue as et
     >>> lamp = {"kind": "point", "flux": 1}
-    >>> rounds = trace_rounds(et.Scene(sources=[lamp]), rays=3e6)
+    >>> rounds = trace_rounds(et.Scene(sources=[lamp]), rays=1.1e6)
     >>> first = next(rounds)
     >>> first.complete, round(first.ledger.escaped.flux, 9)
     (False, 1.0)
-    >>> et.trace(et.Scene(sources=[lamp]), 3e6, resume=first).complete
+    >>> et.trace(et.Scene(sources=[lamp]), 1.1e6, resume=first).complete
     True
     """
     threads = checked_threads(threads)

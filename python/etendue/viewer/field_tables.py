@@ -167,7 +167,7 @@ class FieldTables:
     Examples
     --------
     >>> import etendue as et
-    >>> field = et.LightField.fit(et.RingSource(rays=20_000), et.Disk(radius=30), depths=(3, 3, 2, 2))
+    >>> field = et.LightField.fit(et.RingSource(rays=2000), et.Disk(radius=30), depths=(3, 3, 2, 2))
     >>> tables = FieldTables.of(field)
     >>> round(tables.bound, 4)
     0.002

@@ -200,7 +200,7 @@ def solid_nodes(field: LightField) -> tuple[Array, Array]:
     Examples
     --------
     >>> import etendue as et
-    >>> field = et.LightField.fit(et.RingSource(rays=20_000), et.Disk(radius=30), depths=(3, 3, 2, 2))
+    >>> field = et.LightField.fit(et.RingSource(rays=2000), et.Disk(radius=30), depths=(3, 3, 2, 2))
     >>> c, gamma = solid_nodes(field)
     >>> float(c[0]), float(gamma[0]), float(gamma[-1]), len(c) * len(gamma) <= MOST_DIRECTIONS
     (0.0, 0.0, 180.0, True)

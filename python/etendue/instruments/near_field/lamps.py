@@ -105,7 +105,7 @@ class FieldLamp(Lamp):
     Examples
     --------
     >>> import etendue as et
-    >>> rings = et.RingSource(rays=20_000)
+    >>> rings = et.RingSource(rays=2000)
     >>> lamp = FieldLamp(et.LightField.fit(rings, et.Disk(radius=30), depths=(2, 2, 2, 2)), None, None)
     >>> round(lamp.reach((0.0, 0.0, 0.0))[1])
     30
