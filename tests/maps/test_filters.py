@@ -327,8 +327,18 @@ def test_sizes_that_are_not_odd_numbers_are_refused(size: Any) -> None:
         filter_map(make_map([[1.0]]), "average", size)
 
 
-@pytest.mark.parametrize("gamma", [0.0, -0.1, math.nan, math.inf])
-def test_gamma_outside_its_domain_is_refused(gamma: float) -> None:
+@pytest.mark.parametrize("name", FILTERS)
+def test_a_kernel_beyond_the_map_costs_nothing(name: str) -> None:
+    """Of a size that no memory holds, the map has what the smallest kernel that reaches everywhere gives."""
+    lmap = random_map((4, 6), seed=9)
+    whole, beyond = filter_map(lmap, name, (7, 11)), filter_map(lmap, name, 10**14 + 1)
+    np.testing.assert_array_equal(beyond.values, whole.values)
+    np.testing.assert_array_equal(beyond.standard_error, whole.standard_error)
+    assert f"{10**14 + 1}×" in beyond.notes[0]
+
+
+@pytest.mark.parametrize("gamma", [0.0, -0.1, math.nan, math.inf, "0.2", None])
+def test_gamma_outside_its_domain_is_refused(gamma: Any) -> None:
     with pytest.raises(ArgumentError, match="gamma"):
         filter_map(make_map([[1.0]]), "selective", gamma=gamma)
 

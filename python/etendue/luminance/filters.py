@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.luminance.redrawn_maps import redrawn
-from etendue.quantities.arguments import require_known
+from etendue.quantities.arguments import require_known, require_number
 from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map, notes_that_stay
 from etendue.quantities.powers_of_ten import counted, rounded
 
@@ -25,6 +25,8 @@ SMOOTHING = ("filter ", "denoised ")
 """How steps of the provenance begin that let the errors of pixels depend on each other."""
 
 TOGETHER = "pixels of light fields and of smoothed maps err together: standard errors are no less for it"
+
+FRACTION = "a finite fraction > 0, such as 0.2"
 
 DRAWS, FEWEST_DRAWS = 24, 6
 """Maps drawn anew for the errors of the selective filters: each error is then known to 15 %, or to 30 % by the fewest."""
@@ -141,9 +143,13 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     require_known(kind, FILTERS, "filter")
     chosen = FILTERS[kind]
     rows, columns = _kernel_size(size)
-    if chosen.selective and not (math.isfinite(gamma) and gamma > 0.0):
-        raise ArgumentError(f"filter_map: gamma is {gamma}; give a finite fraction > 0, such as 0.2.")
-    weights = _weights(rows, chosen.weighted), _weights(columns, chosen.weighted)
+    if chosen.selective:
+        require_number(gamma, "filter_map: gamma", FRACTION)
+        if not (math.isfinite(gamma) and gamma > 0.0):
+            raise ArgumentError(f"filter_map: gamma is {gamma}; give {FRACTION}.")
+    # What reaches beyond both edges from every pixel is never used.
+    reached = [min(size, 2 * length - 1) for size, length in zip((rows, columns), lmap.values.shape, strict=True)]
+    weights = _weights(reached[0], chosen.weighted), _weights(reached[1], chosen.weighted)
     together = pixels_err_together(lmap)
     power, width = (1 if together else 2), (gamma if chosen.selective else None)
     stack = _Stack.of(lmap, lmap.standard_error if together else errors_apart(lmap) ** 2)

@@ -356,7 +356,7 @@ class GriddedSource:
         found = summed_intensity(self.patches, c_planes, gamma_step)
         return dataclasses.replace(found, values=found.values * self.factor, notes=(*found.notes, self.flux_note))
 
-    def sample(self, n: int, seed: int) -> RaySet:
+    def sample(self, n: int, seed: int = 1) -> RaySet:
         """Draw rays of equal flux, patch by patch by the flux of its table, directions exactly from the table.
 
         On a flat patch the density of rays is that of `luminance`. On a curved one rays leave each point in proportion to
