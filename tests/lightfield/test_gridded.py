@@ -54,14 +54,14 @@ def from_sphere(n: int, seed: int, radius: float, downwards: bool = False) -> tu
 def test_the_thesis_counts() -> None:
     """368 planar pixels of 0.125 mm on a disk of 1.264 mm; 49, 169 and 961 spherical ones (section 3.3.3)."""
     rng = np.random.default_rng(1)
-    r, turn = 1.264 * np.sqrt(1 - rng.random(400_000) ** 3), rng.random(400_000) * 2 * np.pi
+    r, turn = 1.264 * np.sqrt(1 - rng.random(150_000) ** 3), rng.random(150_000) * 2 * np.pi
     position = np.column_stack([r * np.cos(turn), r * np.sin(turn), 0 * r])
     rays = et.RaySet(position, np.tile([0.1, 0.2, 1.0], (len(r), 1)), np.ones(len(r)))
     source = GriddedSource.fit(rays, Disk(radius=1.264), pixel=0.125, threshold=2.0)
     assert len(source.patches) == 368
     assert set(source.patches.shapes) == {"square"}
     for parallels, cells in ((4, 49), (7, 169), (16, 961)):
-        x, d = from_sphere(60_000, parallels, 1.264)
+        x, d = from_sphere(20_000, parallels, 1.264)
         dome = GriddedSource.fit(et.RaySet(x, d, np.ones(len(x))), Hemisphere(radius=1.264), 1.0, 5.0, parallels)
         assert len(dome.patches) == cells
         assert dome.patches.area.sum() == pytest.approx(2 * math.pi * 1.264**2, rel=1e-12)

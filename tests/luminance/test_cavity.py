@@ -48,7 +48,7 @@ def cavity() -> et.Scene:
 
 @pytest.fixture(scope="module")
 def traced() -> TraceResult:
-    result = et.trace(cavity(), 1e6, 11)
+    result = et.trace(cavity(), 4e5, 11)
     assert result.ledger.closes
     assert result.ledger.lost == ()
     return result
