@@ -77,6 +77,7 @@ def test_the_map_is_that_of_the_patches(grids: dict[str, et.GriddedSource]) -> N
     assert_agree(values=found.values[lit], expected=expected[lit], standard_error=found.standard_error[lit])
     assert_differ(values=found.values[lit], other=expected[::-1, ::-1][lit], standard_error=found.standard_error[lit])
     assert any("multiplied by" in note for note in found.notes)
+    assert any("in no standard error" in note for note in found.notes)
 
 
 @pytest.mark.slow

@@ -243,6 +243,7 @@ def test_a_gridded_source_has_the_flux_of_its_rays() -> None:
     result = et.trace(scene, rays=None)
     assert result.ledger.total.flux == pytest.approx(500, rel=1e-9)
     assert any(f"multiplied by {500 / grid.table_flux:.4g}, to 500 lm" in note for note in result.notes)
+    assert any("in no standard error" in note for note in result.notes)
 
 
 def test_a_gridded_source_is_the_rays_that_it_draws(tmp_path: Path) -> None:

@@ -110,7 +110,8 @@ class PixelatedSurface:
             if sum(p.count for p in pixels) <= MOST_PIXELS:
                 return cls(surface, pixels, centre_on, origin)
         raise ArgumentError(
-            f"more than {MOST_PIXELS:,} pixels on {surface.told}; give a larger pixel than {pixel:g} mm."
+            f"more than {MOST_PIXELS:,} pixels on {surface.told}; give a larger pixel than {pixel:g} mm, or a "
+            "surface that ends where the light does, such as disk:radius=20."
         )
 
     @property

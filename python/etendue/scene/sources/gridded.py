@@ -23,6 +23,8 @@ from etendue.quantities.spectrum import Spectrum
 from etendue.scene.placement import Placement
 from etendue.scene.sources.source import Emitter, Source
 
+NO_ERRORS = "tables of patches do not know their error: what they miss of their rays is in no standard error"
+
 
 class Gridded(Source):
     """The patches of a `GriddedSource`: a ray file sampled on a surface, pixel by pixel.
@@ -94,7 +96,7 @@ class Gridded(Source):
         drawn, flux = gridded.sample(self.draws, self.seed), gridded.emitted_flux
         scale = drawn.flux_scale * flux / drawn.total_flux
         record = {"kind": "rays", "rays": drawn.core_source(), "scale": scale, "flux": flux}
-        return (Emitter(record, gridded.flux_unit, known, flux_notes=drawn.notes),)
+        return (Emitter(record, gridded.flux_unit, known, flux_notes=(*drawn.notes, NO_ERRORS)),)
 
     def some_rays(self, files: Files, most: int) -> RaySet:
         """Rays drawn from it."""
@@ -140,4 +142,4 @@ class SeenGridded(Gridded):
         """The patches with the flux of the rays on them, which tables of coarse bins do not hold."""
         gridded, known = self._gridded(files)
         record = {"kind": "patches", **core_patches(gridded.surface, gridded.patches), "flux": gridded.emitted_flux}
-        return (Emitter(record, gridded.flux_unit, known, flux_notes=(gridded.flux_note,)),)
+        return (Emitter(record, gridded.flux_unit, known, flux_notes=(gridded.flux_note, NO_ERRORS)),)
