@@ -229,7 +229,8 @@ def write(data: BsdfData, stream: BinaryIO) -> tuple[str, ...]:
         if not own:
             continue
         wanted = direction(thetas, azimuth_of(phis + 180.0), behind=not front)
-        order = [int(np.argmin([np.abs(one.incident - d).max() for one in own])) for d in wanted]
+        apart = np.abs(np.array([one.incident for one in own]) - wanted[:, None]).max(axis=2)
+        order = apart.argmin(axis=1)
         matrix = np.stack([own[k].values for k in order], axis=1)
         lines += block_of(
             name,
