@@ -48,7 +48,7 @@ class Module:
                 yield from ((f"{node.module}.{alias.name}", node.lineno) for alias in node.names)
 
 
-@functools.cache
+@pytest.fixture(scope="module")
 def modules() -> tuple[Module, ...]:
     found = []
     for path in sorted(PACKAGE.rglob("*.py")):
@@ -90,17 +90,17 @@ def test_the_contract_is_the_plan() -> None:
 
 
 @pytest.mark.slow
-def test_every_module_stands_on_one_floor() -> None:
-    assert len(modules()) > 20
-    homeless = [m.name for m in modules() if place(m.name) is None]
+def test_every_module_stands_on_one_floor(modules: tuple[Module, ...]) -> None:
+    assert len(modules) > 20
+    homeless = [m.name for m in modules if place(m.name) is None]
     assert homeless == ["etendue", "etendue.__main__"]  # the front doors, through which users come in at the top
 
 
 @pytest.mark.slow
-def test_imports_go_down_only() -> None:
-    known = {m.name for m in modules()} | {"etendue._core"}
+def test_imports_go_down_only(modules: tuple[Module, ...]) -> None:
+    known = {m.name for m in modules} | {"etendue._core"}
     imports = 0
-    for module in modules():
+    for module in modules:
         here = place(module.name)
         if here is None:
             continue
@@ -117,9 +117,9 @@ def test_imports_go_down_only() -> None:
 
 
 @pytest.mark.slow
-def test_only_the_command_line_prints() -> None:
+def test_only_the_command_line_prints(modules: tuple[Module, ...]) -> None:
     looked = 0
-    for module in modules():
+    for module in modules:
         if is_within(module.name, "etendue.cli"):
             continue
         looked += 1
@@ -130,10 +130,10 @@ def test_only_the_command_line_prints() -> None:
 
 
 @pytest.mark.slow
-def test_no_memory_is_used_before_it_is_filled() -> None:
+def test_no_memory_is_used_before_it_is_filled(modules: tuple[Module, ...]) -> None:
     banned = {f"{package}.{name}" for package in ("np", "numpy") for name in ("empty", "empty_like", "ndarray")}
     seen = 0
-    for module in modules():
+    for module in modules:
         assert not {"numpy.empty", "numpy.empty_like"} & {name for name, _ in module.names()}
         for called, line in module.calls:
             seen += called.startswith("np.")
@@ -243,6 +243,7 @@ WITHOUT_EXAMPLE = {
     "etendue.luminance.methods.Method": "what Cone, FromField and PathTracing share, which show it",
     "etendue.luminance.source_kinds.SourceKind": "a row of a table; tests/luminance/test_methods.py shows it",
     "etendue.luminance.method_choice.Spelling": "how messages name options; tests/luminance/test_methods.py shows both",
+    "etendue.quantities.hat_sums.HatSums": "what Hats.sums returns, shown in its example",
     "etendue.quantities.node_choice.Choice": "what choose_nodes returns",
     "etendue.tracing.far_fields.far_field_nodes": "a step of trace_rounds, which shows it",
     "etendue.instruments.near_field.storage": "NearFieldRun.save and load are the door; tests/instruments shows them",
@@ -270,8 +271,8 @@ WITHOUT_EXAMPLE = {
 """Public things whose docstring may do without an example, with the reason."""
 
 
-def public_things() -> Iterator[tuple[str, ast.FunctionDef | ast.ClassDef]]:
-    for module in modules():
+def public_things(modules: tuple[Module, ...]) -> Iterator[tuple[str, ast.FunctionDef | ast.ClassDef]]:
+    for module in modules:
         for node in module.tree.body:
             if not isinstance(node, ast.FunctionDef | ast.ClassDef) or node.name.startswith("_"):
                 continue
@@ -280,8 +281,9 @@ def public_things() -> Iterator[tuple[str, ast.FunctionDef | ast.ClassDef]]:
             yield f"{module.name}.{node.name}", node
 
 
-def test_everything_public_is_explained_and_shown() -> None:
-    things = dict(public_things())
+@pytest.mark.slow
+def test_everything_public_is_explained_and_shown(modules: tuple[Module, ...]) -> None:
+    things = dict(public_things(modules))
     assert len(things) > 100
     shown, excused = set(), set()
     for name, node in things.items():

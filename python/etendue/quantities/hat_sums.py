@@ -48,8 +48,14 @@ class Hats:
         Rows.
     span : float
         180 or 360 [°]. At the ends of the former are nodes of their own, those of the latter are one.
-    moments : array, shape (5, rows, cells)
-        Σw, Σwt, Σw², Σw²t, Σw²t² of even cells, with t from 0 to 1 in each.
+    moments : list of array, shape (5, rows, cells)
+        Σw, Σwt, Σw², Σw²t, Σw²t² of even cells, with t from 0 to 1 in each: of the finest ones, and of wider ones.
+
+    Examples
+    --------
+    >>> hats = Hats.of(np.array([10.0, 50.0]), np.ones(2), np.zeros(2, dtype=np.intp), 1, 360.0, 1, 3)
+    >>> hats.sums(4).held.round(3).tolist()
+    [[1.333, 0.667, 0.0, 0.0]]
     """
 
     angle: Array
@@ -61,14 +67,7 @@ class Hats:
 
     @classmethod
     def of(cls, angle: Array, weight: Array, row: Counts, rows: int, span: float, widest: int, depth: int) -> Hats:
-        """For `widest` steps of the span, and those halved up to `depth` times.
-
-        Examples
-        --------
-        >>> hats = Hats.of(np.array([10.0, 50.0]), np.ones(2), np.zeros(2, dtype=np.intp), 1, 360.0, 1, 3)
-        >>> hats.sums(4).held.round(3).tolist()
-        [[1.333, 0.667, 0.0, 0.0]]
-        """
+        """For `widest` steps of the span, and those halved up to `depth` times."""
         cells = 2 * widest
         while cells < widest << depth and 2 * cells * rows <= max(FEWEST_CELLS, angle.size):
             cells *= 2
