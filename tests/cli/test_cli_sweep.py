@@ -115,6 +115,7 @@ def test_a_table_is_kept_where_its_picture_has_no_room(run: Run, scene: Path, tm
     call = ("sweep", scene, "--set", "die.flux=1,2", "--measure", measures, "--rays", 100)
     outcome = run(*call, "-o", "a.png", "-o", "a.csv")
     assert outcome.status == 1
+    assert "a.png: not written:" in outcome.err
     assert "13 lines in a diagram" in outcome.err
     assert files(tmp_path) == ["a.csv", "die.toml"]
 

@@ -10,6 +10,7 @@ import typer
 from etendue.cli.options import Json, Threads, ray_format
 from etendue.cli.stated import refuse
 from etendue.cli.terminal import check_folder, complain, count, numbers, print_json, progress_bar, say
+from etendue.cli.writing import Writing
 from etendue.errors import ArgumentError
 from etendue.formats.intensity import INTENSITY_EXTENSIONS, write_intensity
 from etendue.formats.maps import PICTURE_EXTENSIONS
@@ -163,17 +164,23 @@ def goniophotometer(
             told = None if progress is None else lambda done, _: progress(done)
             run = gonio.measure(lamp, seed=seed, samples=samples, threads=threads, progress=told)
     notes = dict.fromkeys(run.notes)
+    writing = Writing()
+
+    def write(path: Path) -> None:
+        notes.update(dict.fromkeys(_write(run, path, rays, format, at, seed)))
+
     for path in outputs:
-        notes |= dict.fromkeys(_write(run, path, rays, format, at, seed))
-    facts = _facts(run) | {"lamp": lamp, "outputs": outputs, "notes": list(notes)}
+        writing.write(path, write)
+    facts = _facts(run) | {"lamp": lamp, "outputs": writing.done, "notes": list(notes)}
     if json:
         print_json(facts)
-        return
-    for note in notes:
-        complain(f"note: {note}")
-    _tell(run)
-    for path in outputs:
-        say(f"{path}: written")
+    else:
+        for note in notes:
+            complain(f"note: {note}")
+        _tell(run)
+        for path in writing.done:
+            say(f"{path}: written")
+    writing.finish()
 
 
 def _steps(text: str) -> float | tuple[float, float]:

@@ -13,6 +13,7 @@ from etendue.cli.field import complaints_of, read_source
 from etendue.cli.options import Flux, Json, Unit
 from etendue.cli.stated import refuse_without_picture
 from etendue.cli.terminal import check_outputs, complain, one_of, print_json, progress_bar, say
+from etendue.cli.writing import Writing
 from etendue.errors import UnsupportedFormatError
 from etendue.formats.intensity import (
     INTENSITY_EXTENSIONS,
@@ -99,22 +100,26 @@ def intensity(
         complaints = [str(c) for c in result.complaints]
     shown = result.mirrored() if mirror else result
     shown = shown.rotated_about_axis(rotate) if rotate else shown
-    losses = []
+    writing = Writing()
+
+    def write(path: Path) -> tuple[str, ...]:
+        if path.suffix.lower() not in PICTURE_EXTENSIONS:
+            return write_intensity(path, result, rotate=rotate, mirror=mirror)
+        plot_intensity(shown, path, shape, per_klm=per_klm)
+        return ()
+
     for path in outputs:
-        if path.suffix.lower() in PICTURE_EXTENSIONS:
-            plot_intensity(shown, path, shape, per_klm=per_klm)
-        else:
-            losses += [f"{path}: {note}" for note in write_intensity(path, result, rotate=rotate, mirror=mirror)]
+        writing.write(path, write)
     if json:
-        print_json(
-            {"file": file, **describe_intensity(shown), "outputs": outputs, "complaints": complaints, "losses": losses}
-        )
-        return
-    for line in (*complaints, *(f"note: {note}" for note in losses)):
-        complain(line)
-    print_intensity(shown)
-    for path in outputs:
-        say(f"  {path}")
+        found = {"outputs": writing.done, "complaints": complaints, "losses": writing.losses}
+        print_json({"file": file, **describe_intensity(shown), **found})
+    else:
+        for line in (*complaints, *(f"note: {note}" for note in writing.losses)):
+            complain(line)
+        print_intensity(shown)
+        for path in writing.done:
+            say(f"  {path}")
+    writing.finish()
 
 
 def _refuse(file: Path, kinds: str, given: Mapping[str, object]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Annotated
 
@@ -24,6 +25,7 @@ from etendue.cli.terminal import (
     say,
     whole_numbers,
 )
+from etendue.cli.writing import Writing
 from etendue.errors import ArgumentError
 from etendue.formats.maps import PICTURE_EXTENSIONS
 from etendue.luminance.regions import parse_region
@@ -145,22 +147,24 @@ def sweep(
                 raise
             interrupted = True
     assert table is not None  # noqa: S101 - there is at least one step
-    # Tables first: what was computed is not lost with a picture that cannot be drawn.
-    for path in sorted(outputs, key=lambda path: path.suffix.lower() not in EXTENSIONS):
-        if path.suffix.lower() in EXTENSIONS:
-            table.save(path)
-        else:
-            plot_sweep(table, path)
+    writing = Writing()
+    for path in outputs:
+        writing.write(path, table.save if path.suffix.lower() in EXTENSIONS else functools.partial(_draw, table))
     if interrupted:
         complain(f"stopped; what was written has {table.done:,} of {table.steps:,} steps, each of them whole")
     if json:
-        print_json({"file": file, **table.to_dict(), "outputs": outputs, "interrupted": interrupted})
+        print_json({"file": file, **table.to_dict(), "outputs": writing.done, "interrupted": interrupted})
     else:
         print_table(table)
-        for path in outputs:
+        for path in writing.done:
             say(f"  {path}")
+    writing.finish()
     if interrupted:
         raise typer.Exit(INTERRUPTED)
+
+
+def _draw(table: SweepTable, path: Path) -> None:
+    plot_sweep(table, path)
 
 
 def _refuse_idle(names: list[str], *, stated_observer: bool) -> None:

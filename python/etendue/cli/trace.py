@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import shlex
 import sys
@@ -14,8 +15,10 @@ import typer
 from etendue.cli.guard import require_apart
 from etendue.cli.options import Json, Threads
 from etendue.cli.terminal import INTERRUPTED, check_folder, complain, count, print_json, progress_bar, say
+from etendue.cli.writing import Writing
 from etendue.errors import ArgumentError, UnknownNameError
 from etendue.formats.intensity import INTENSITY_EXTENSIONS, write_intensity
+from etendue.formats.intensity.eulumdat_writer import require_luminous
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.formats.rays import RAY_FORMATS, write_rays
 from etendue.plot.intensity_picture import plot_intensity
@@ -114,6 +117,8 @@ def trace(
     rounds = trace_rounds(scene, rays, seed, until=until, most_events=most_events, threads=threads, resume=started)
     writers = _writers(outputs, [(own.name, own.KIND) for own in rounds.plan.detections])
     require_apart([file, *scene.read_files()], [*outputs, *(path for path, _, _ in writers)])
+    if any(path.suffix.lower() == ".ldt" for path in outputs):
+        require_luminous(rounds.plan.flux_unit)
     result: TraceResult | None = started
     interrupted = False
     with progress_bar("rays", rounds.plan.rays) as progress:
@@ -126,14 +131,7 @@ def trace(
                 raise
             interrupted = True
     assert result is not None  # noqa: S101 - there is at least one round
-    losses = []
-    written = [path for path in outputs if path.suffix.lower() in RESULT_EXTENSIONS]
-    written += [path for path, _, _ in writers]
-    for path in outputs:
-        if path.suffix.lower() in RESULT_EXTENSIONS:
-            result.save(path)
-    for path, name, write in writers:
-        losses += [f"{path}: {note}" for note in write(result, name, path)]
+    writing = _written(result, outputs, writers)
     if interrupted:
         complain(f"stopped; what was written is the valid result of {result.rays_done:,} of {result.rays_asked:,} rays")
         complain(_how_to_go_on(outputs))
@@ -141,15 +139,35 @@ def trace(
         copies = " More of them do not help where they are copies of the rays of a set." if _copied(result.plan) else ""
         complain(f"--until {until:g} was not reached: {result.relative_error:.3g} with all rays of --rays.{copies}")
     if json:
-        print_json({"file": file, **result.to_dict(), "outputs": written, "losses": losses, "interrupted": interrupted})
+        print_json(
+            {
+                "file": file,
+                **result.to_dict(),
+                "outputs": writing.done,
+                "losses": writing.losses,
+                "interrupted": interrupted,
+            }
+        )
     else:
-        for note in losses:
+        for note in writing.losses:
             complain(f"note: {note}")
         print_result(result)
-        for path in written:
+        for path in writing.done:
             say(f"  {path}")
+    writing.finish()
     if interrupted:
         raise typer.Exit(INTERRUPTED)
+
+
+def _written(result: TraceResult, outputs: list[Path], writers: list[tuple[Path, str, Write]]) -> Writing:
+    """The whole result first, then what each detector saw."""
+    writing = Writing()
+    for path in outputs:
+        if path.suffix.lower() in RESULT_EXTENSIONS:
+            writing.write(path, result.save)
+    for path, name, write in writers:
+        writing.write(path, functools.partial(write, result, name))
+    return writing
 
 
 def _copied(plan: Plan) -> bool:

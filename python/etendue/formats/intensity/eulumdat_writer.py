@@ -20,7 +20,7 @@ from etendue.formats.intensity.intensity_format import (
 from etendue.formats.intensity.lm63_writer import further_keywords
 from etendue.formats.intensity.symmetry import Array, folded, unfolded, whole_hemispheres
 from etendue.quantities.intensity import Intensity, Symmetry
-from etendue.units import LUMENS_PER_KILOLUMEN
+from etendue.units import INTENSITY_NAME, INTENSITY_UNIT, LUMENS_PER_KILOLUMEN, FluxUnit
 
 MOST_PLANES, MOST_GAMMAS = 721, 361
 TEXT = 78
@@ -30,13 +30,25 @@ NUMBER_OF_SYMMETRY: dict[Symmetry, int] = {"none": 0, "rotational": 1, "C0-C180"
 SHAPES = {"point", "circle", "rectangle", "box", "vertical cylinder"}
 
 
-def write(intensity: Intensity, path: Path) -> tuple[str, ...]:
-    """Write the planes that symmetry leaves, in candela per kilolumen of the lamps, or of the luminaire if absolute."""
-    if intensity.flux_unit != "lm":
+def require_luminous(flux_unit: FluxUnit) -> None:
+    """Refuse radiant intensity, which the format has no room for.
+
+    Raises
+    ------
+    ArgumentError
+        If the unit of the flux is not the lumen.
+    """
+    if flux_unit != "lm":
+        found = f"{INTENSITY_NAME[flux_unit]} [{INTENSITY_UNIT[flux_unit]}]"
         raise ArgumentError(
-            f"EULUMDAT knows luminous intensity only, and this is {intensity.quantity} [{intensity.unit}]. "
+            f"EULUMDAT knows luminous intensity only, and this is {found}. "
             "Write an .ies file, or convert the rays to lumens first: --unit lm, or RaySet.in_unit('lm') in Python."
         )
+
+
+def write(intensity: Intensity, path: Path) -> tuple[str, ...]:
+    """Write the planes that symmetry leaves, in candela per kilolumen of the lamps, or of the luminaire if absolute."""
+    require_luminous(intensity.flux_unit)
     whole, notes = whole_hemispheres(intensity)
     flux = whole.flux
     if not flux > 0.0:
