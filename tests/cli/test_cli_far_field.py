@@ -41,4 +41,5 @@ def test_the_program_tells_what_it_traced(run: Run, tmp_path: Path) -> None:
     far = json.loads(run("trace", "light.toml", "--rays", "1e5", "--json")[1])["detectors"][0]
     assert 0.0 < far["maximum_error"] < 0.1 * far["maximum"]
     assert 0.0 < far["flux_error"] < 0.01 * far["flux"]
+    assert (far["flux_unit"], far["unit"]) == ("lm", "cd")
     assert "too wide" in far["notes"][0]

@@ -69,6 +69,7 @@ class FarFieldIntensity(Detection[Intensity]):
         return {
             "flux": quantity.flux,
             "flux_error": quantity.flux_error,
+            "flux_unit": quantity.flux_unit,
             "maximum": quantity.maximum,
             "maximum_error": quantity.maximum_error,
             "peak_intensity": quantity.peak_intensity,
