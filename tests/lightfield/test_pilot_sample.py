@@ -42,8 +42,8 @@ def test_what_lies_at_the_end_of_a_file_has_its_share() -> None:
 
 def test_a_file_with_a_period_is_not_read_at_one_phase_of_it() -> None:
     """The phases at which pieces begin are spread evenly over a period as long as a part of the set: χ² over ten classes."""
-    sample = numbers_of(pilot_sample(numbered(512 * 4000), 1 << 17))
-    phases = (sample[::STRETCH] % 4000) * 10 // (4000 - STRETCH + 1)
+    sample = numbers_of(pilot_sample(numbered(512 * 1000), 1 << 17))
+    phases = (sample[::STRETCH] % 1000) * 10 // (1000 - STRETCH + 1)
     counts = np.bincount(phases, minlength=10)
     expected = len(phases) / 10
     chi_squared = float(((counts - expected) ** 2 / expected).sum())

@@ -522,10 +522,12 @@ def test_a_column_of_watts_is_better_than_a_spectrum() -> None:
 
 
 @pytest.mark.parametrize("wavelength", [math.nan, 0.0, -450.0])
-def test_the_ray_whose_wavelength_is_missing_is_named(wavelength: float) -> None:
+def test_the_ray_whose_wavelength_is_missing_is_named(wavelength: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the second stretch of the rays."""
+    monkeypatch.setattr(ray_rewriting, "CHUNK", 1000)
     watts = radiometric(ray_rewriting.CHUNK + 10)
     watts.records["wavelength"][ray_rewriting.CHUNK + 3] = wavelength
-    with pytest.raises(UnitError, match=rf"led\.ray: ray 262,148 has the wavelength {wavelength:g} nm.*--flux 54.6lm"):
+    with pytest.raises(UnitError, match=rf"led\.ray: ray 1,004 has the wavelength {wavelength:g} nm.*--flux 54.6lm"):
         watts.in_unit("lm")
 
 
