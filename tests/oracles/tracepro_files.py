@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 
@@ -133,6 +134,7 @@ def _both(f: Function, numbers: Row, table: Sequence[Row] = ()) -> str:
     return section(rows=rows, table=table)
 
 
+@functools.cache
 def small_files() -> dict[str, bytes]:
     """A small file of each kind of scatter, and of a coating with two sides."""
     along = streak(a=0.05, b=0.1, g=1.5, sigma=0.2)
