@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +21,11 @@ LAMP: dict[str, Any] = {
 CARD: dict[str, Any] = {"name": "card", "kind": "illuminance", "width": 40, "height": 30, "columns": 4, "rows": 3}
 
 
+@functools.cache
 def traced() -> et.TraceResult:
     disk = {"name": "disk", "kind": "rays", "shape": {"kind": "disk", "radius": 20}, "at": [0, 0, 5]}
     card = {**CARD, "at": [0, 0, 30], "toward": [0, 0, -1]}
-    return et.trace(et.Scene(sources=[LAMP], detectors=[disk, card]), rays=20_000)
+    return et.trace(et.Scene(sources=[LAMP], detectors=[disk, card]), rays=5000)
 
 
 def make_files(folder: Path) -> Path:
