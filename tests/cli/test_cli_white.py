@@ -94,6 +94,21 @@ def test_the_two_totals_of_a_header_convert_it(run: Run, yellow: Path, tmp_path:
     assert "54.6 lm and 0.694 W, as if all rays had one spectrum" in done.err
 
 
+@pytest.mark.parametrize(("lumens", "told"), [(K_M * V_450, False), (1.005 * K_M * V_450, False), (300.0, True)])
+def test_totals_of_a_header_that_the_wavelengths_contradict_are_told(
+    run: Run, blue: Path, tmp_path: Path, lumens: float, told: bool
+) -> None:
+    """1 W at 450 nm is 683 V(450) lm, whatever the header says of it and whatever total in W is stated."""
+    data = bytearray(blue.read_bytes())
+    struct.pack_into("<f", data, 12, lumens)
+    blue.write_bytes(data)
+    for more, total in (((), 1.0), (("--flux", "2W"), 2.0)):
+        done = run("convert", blue, tmp_path / "lm.csv", "--unit", "lm", *more, "--json")
+        assert done.json["total_flux"] == pytest.approx(total * K_M * V_450, rel=1e-5)
+        said = f"the header says {lumens:.4g} lm beside 1 W, and the rays give {K_M * V_450:.4g} lm for it"
+        assert any(said in complaint for complaint in done.json["complaints"]) is told
+
+
 def test_a_stated_flux_in_another_unit_is_an_assumption_that_is_told(run: Run, yellow: Path, tmp_path: Path) -> None:
     et.write_rays(tmp_path / "dull.tm25ray", part("W", 2.0, 5))
     done = run(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -11,15 +12,42 @@ from etendue.quantities.arguments import require_known
 from etendue.quantities.ray_records import RayRecords
 from etendue.quantities.ray_rewriting import Rays, column_of, with_flux, without
 from etendue.quantities.ray_stream import FloatArray, RayBatch
+from etendue.quantities.report import Complaint
 from etendue.quantities.spectrum import Spectrum, photopic_efficiency
 from etendue.units import FLUX_UNITS, LUMINOUS_EFFICACY_MAX, FluxUnit
 
+TOTALS_APART = 0.01
+"""Share by which lumens per watt of the rays may differ from those of the header's totals without a word: spectra that are
+sampled in other steps differ by some thousandths."""
+
 
 def in_unit(rays: Rays, unit: FluxUnit) -> Rays:
-    """The set with its flux in lumens or watts, through its spectrum: Φ_v = K_m ∫ Φ_e,λ V(λ) dλ."""
+    """The set with its flux in lumens or watts, through its spectrum: Φ_v = K_m ∫ Φ_e,λ V(λ) dλ.
+
+    A complaint tells if the totals of its header say something else.
+    """
     require_known(unit, FLUX_UNITS, "flux unit")
-    if unit == rays.flux_unit:
-        return rays
+    return rays if unit == rays.flux_unit else _with_contradiction(rays, _converted(rays, unit))
+
+
+def _with_contradiction(rays: Rays, converted: Rays) -> Rays:
+    """The converted set, with a complaint if the totals of the file's header say another ratio of lumens to watts."""
+    header = rays.header
+    total = header.get("total_flux", header.get("overruled_total_flux"))
+    other = header.get("luminous_flux" if converted.flux_unit == "lm" else "radiant_flux")
+    known = all(isinstance(value, float) and 0.0 < value < math.inf for value in (total, other))
+    if not known or not rays.total_flux > 0.0:
+        return converted
+    found = total * converted.total_flux / rays.total_flux
+    if abs(found / other - 1.0) <= TOTALS_APART:
+        return converted
+    said = f"the header says {other:.4g} {converted.flux_unit} beside {total:.4g} {rays.flux_unit}"
+    told = f"{said}, and the rays give {found:.4g} {converted.flux_unit} for it; that of the rays is used"
+    return converted.replace(complaints=(*converted.complaints, Complaint("warning", "total flux", told)))
+
+
+def _converted(rays: Rays, unit: FluxUnit) -> Rays:
+    """The set in the other unit."""
     # A radiant-flux column beside a luminous one is the better truth: it is used before any spectrum.
     if unit == "W" and "radiant_flux" in rays.columns:
         return with_flux(
