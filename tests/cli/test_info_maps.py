@@ -90,4 +90,9 @@ def test_the_maximum_of_a_smoothed_map_is_lifted_by_no_chance_of_single_pixels(r
     assert noisy["maximum"] - noisy["maximum_apart"] > 0.25
     smooth = run("filter", "noisy.npz", "--kind", "average", "-o", "smooth.npz", "--json").json
     assert smooth["maximum_apart"] == smooth["maximum"]
+    assert smooth["common_error"] == 0.0
+    et.read_map("noisy.npz").replace(common_error=0.05).save("shared.exr")
+    shared = run("filter", "shared.exr", "--kind", "weighted", "-o", "smooth.npz", "--json").json
+    assert shared["common_error"] == 0.05
+    assert "an error of 5.00% in common, of which means take nothing" in shared["notes"][-1]
     assert "lifted by chance" not in run("info", "smooth.npz").out
