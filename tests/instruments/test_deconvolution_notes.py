@@ -18,7 +18,7 @@ def test_the_peak_of_a_lobe_that_is_round_in_direction_cosines(plane: str, incid
     goniometer = et.ScatterGoniometer(photons=1e8)
     peak = 0.8 / (2.0 * np.pi * WIDTH**2)
     lobe = et.bsdf.Gaussian(peak=peak, sigma=WIDTH)
-    scan = goniometer.measure(lobe, incidence, step=0.2, span=6, plane=plane, method="quadrature")
+    scan = goniometer.measure(lobe, incidence, step=0.4, span=6, plane=plane, method="quadrature")
     found = et.deconvolve(scan, goniometer.instrument_function(), replicates=0)
     (told,) = [note for note in found.notes if "direction cosines" in note]
     stated = float(re.search(r"about ([\d.]+) of", told)[1])  # type: ignore[index] # it is there

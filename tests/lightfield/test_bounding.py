@@ -151,7 +151,7 @@ def faces_of(box: Box) -> Array:
 @pytest.mark.parametrize("body", BODIES, ids=NAMES)
 def test_a_box_of_lines_is_a_least_one(body: Body, aside: tuple[float, float, float], radius: float) -> None:
     """No face of it can be moved for a better one."""
-    position, direction = lines(body, 10_000)
+    position, direction = lines(body, 4000)
     box = box_of_lines(position, direction, np.add(body.middle, aside), radius)
     assert box is not None
     faces = faces_of(box)

@@ -223,6 +223,7 @@ def small(rays: et.RaySet) -> et.LightField:
     return et.LightField.fit(rays, SMALL, depths=(4, 4, 3, 3))
 
 
+@pytest.mark.slow
 def test_a_focused_field_is_saved_whole(small: et.LightField, tmp_path: Path) -> None:
     small.save(tmp_path / "led.h5")
     loaded = et.LightField.load(tmp_path / "led.h5")

@@ -16,8 +16,8 @@ FILM = PrismaticFilm()
 
 @pytest.fixture(scope="module")
 def source() -> GriddedSource:
-    position, direction = FILM.rays(300_000, seed=1)
-    rays = et.RaySet(position, direction, np.full(300_000, FILM.total_flux / 300_000))
+    position, direction = FILM.rays(150_000, seed=1)
+    rays = et.RaySet(position, direction, np.full(150_000, FILM.total_flux / 150_000))
     return GriddedSource.fit(rays, Disk(radius=FILM.radius, centre=FILM.centre), pixel=1.0, threshold=2.1)
 
 

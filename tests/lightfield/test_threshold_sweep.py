@@ -92,16 +92,16 @@ def test_no_score_is_above_that_of_the_truth() -> None:
 
 def test_domes_have_a_sweep_too() -> None:
     truth = DieUnderDome(floor=0.05)
-    position, direction = truth.rays(30_000, seed=2)
+    position, direction = truth.rays(12_000, seed=2)
     seen: list[int] = []
     sweep = threshold_sweep(
-        et.RaySet(position, direction, np.full(30_000, truth.total_flux / 30_000)),
+        et.RaySet(position, direction, np.full(12_000, truth.total_flux / 12_000)),
         Dome(radius=1.264, window=0.9), 0.2, (5.0, 1.0), 5, c_planes=12, gamma_step=10.0, progress=seen.append,
     )  # fmt: skip
     assert sweep.patches > 100
     assert (sweep["score"] > 1).all()
     assert seen == sorted(seen)
-    assert seen[-1] == 30_000
+    assert seen[-1] == 12_000
 
 
 @pytest.mark.parametrize(

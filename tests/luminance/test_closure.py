@@ -181,7 +181,7 @@ def test_where_rays_are_collected_does_not_matter() -> None:
     """V13: the same rays collected on two planes show the same observer the same, ray for ray."""
     planes = [{"name": name, "kind": "rays", "shape": {"kind": "rectangle", "width": 4000, "height": 4000}, "at": [0, 0, z]}
               for name, z in (("near", 10.0), ("far", 90.0))]  # fmt: skip
-    rays = et.trace(lantern(detectors=planes), 4e5, 4).rays
+    rays = et.trace(lantern(detectors=planes), 1.5e5, 4).rays
     eye, screen = et.Observer(20, 50, 500), et.Screen(16, 16, 8, 8)
     near, far = (et.luminance_map(rays[name], eye, screen, method="cone", acceptance=6.0) for name in ("near", "far"))
     assert near.rays.sum() > 1000

@@ -260,7 +260,7 @@ def test_flux_from_disc_to_disc_as_it_is_seen() -> None:
     theta, phi = math.degrees(math.acos(-axis[2])), math.degrees(math.atan2(-axis[1], -axis[0]))
     eye = et.Observer(theta, phi, 1e6, target=tuple(np.array([1, 2, 3]) + d * axis))
     seen = et.luminance_map(
-        et.Scene(sources=[source], surfaces=[target]), eye, et.Screen(6.4, 6.4, 24, 24), rays_per_pixel=1024
+        et.Scene(sources=[source], surfaces=[target]), eye, et.Screen(6.4, 6.4, 24, 24), rays_per_pixel=512
     )
     error = math.sqrt((seen.standard_error**2).sum()) * seen.screen.pixel_area / 1e6
     assert error < 2e-3 * seen.intensity

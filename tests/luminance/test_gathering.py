@@ -162,6 +162,7 @@ def test_gloss_paint_is_known_but_for_what_it_mirrors() -> None:
     assert_agree(values=known.values[lit], expected=exact.values[lit], standard_error=error[lit], degrees=REVERSE)
 
 
+@pytest.mark.slow
 def test_noise_is_smaller(gathered: et.LuminanceMap) -> None:
     exact = seen(et.Scene(**tray()), rays_per_pixel=1024, seed=4)
     lit = exact.values > 0.2 * np.median(exact.values)

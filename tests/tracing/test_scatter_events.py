@@ -139,6 +139,7 @@ def test_light_leaves_all_faces_that_coincide(tmp_path: Path) -> None:
     np.testing.assert_allclose(whole.values, result.images["eye"].values, rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_what_events_say(traced: et.TraceResult) -> None:
     """Light that arrives at a Lambertian surface and does not stay there was reflected or let through."""
     events, ledger = traced.events.only, traced.ledger
