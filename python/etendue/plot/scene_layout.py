@@ -58,7 +58,8 @@ class SceneLayout:
     views : tuple of View
     bounds : array, shape (2, 3)
         Lowest and highest x, y, z of the boxes of all solids and surfaces that have an end, and of the sources [mm], those
-        without a shape as far as 240 of their rays show them; half spaces that trim them do not count. NaN if there are none.
+        without a shape as far as 240 of their rays show them; half spaces that trim them do not count. NaN if there are
+        none.
     media : dict
         By number of the medium: name and refractive index.
     wavelength : float
