@@ -9,6 +9,7 @@ import etendue as et
 import pytest
 from etendue.cli.terminal import count
 from etendue.lightfield.carrier import Disk
+from oracles.light_fields import SURFACES, make_field
 
 from cli.outcome import Run
 
@@ -71,3 +72,11 @@ def test_every_count_of_rays_may_be_a_power_of_ten(run: Run, tmp_path: Path) -> 
     view = ("--observer", "0,0", "--distance", "200", "--size", "6,6", "--pixels", "1,1", "-o", "a.npz")
     assert run("luminance", "lamp.toml", *view, "--rays-per-pixel", "2e1").status == 0
     assert count()(str(2**53 + 1)) == 2**53 + 1
+
+
+def test_more_rays_than_one_of_the_formats_holds_are_refused_before_any_is_written(run: Run, tmp_path: Path) -> None:
+    make_field(SURFACES["plane"]).save(tmp_path / "led.h5")
+    refused = run("sample", "led.h5", "-n", "2147483648", "-o", "a.csv", "-o", "a.dis")
+    assert refused.status == 1
+    assert "a.dis: 2,147,483,648 rays" in refused.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["led.h5"]

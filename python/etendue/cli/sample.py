@@ -11,7 +11,7 @@ from etendue.cli.options import ray_format
 from etendue.cli.terminal import check_folder, complain, count, print_json, progress_bar, say
 from etendue.errors import ArgumentError
 from etendue.formats.patch_folder import is_patch_folder
-from etendue.formats.rays import RAY_FORMATS, write_rays
+from etendue.formats.rays import RAY_FORMATS, writable_format, write_rays
 from etendue.lightfield.gridded.gridded_source import GriddedSource
 from etendue.lightfield.light_field import LightField
 from etendue.quantities.powers_of_ten import counted
@@ -45,6 +45,8 @@ def sample(
     else:
         source = LightField.load(file)
         stream = source.rays(rays, seed)
+    for path in output:
+        writable_format(path, stream, format)
     losses: list[str] = []
     for path in output:
         with progress_bar(path.name, rays) as progress:

@@ -163,6 +163,31 @@ def write_rays(
     require_path(path, "write_rays: path", "the path of the file first, then the rays")
     require(rays, RayStream, "write_rays: rays", "rays, of a file et.read_rays(path)")
     path = Path(path)
+    chosen = writable_format(path, rays, format)
+    notes: tuple[str, ...] = ()
+    if flux_unit is not None and isinstance(rays, RaySet):
+        rays = rays.in_unit(flux_unit)
+        if chosen.wants_watts(rays):
+            rays = rays.without_spectrum()
+            notes = (f"{chosen.title} holds wavelengths and spectra of rays beside W only: they are left out, for lm.",)
+    with atomic_output(path, size=chosen.least_size(rays)) as temporary:
+        return (*notes, *chosen.write(rays, temporary), *rays.notes)
+
+
+def writable_format(path: Path, rays: RayStream, format: str | None = None) -> RayFormat:
+    """The format that a file of these rays will have, which can hold them; looks at their number, not at the rays.
+
+    Raises
+    ------
+    UnknownNameError, ArgumentError
+        As `write_rays`.
+
+    Examples
+    --------
+    >>> from etendue.quantities.ray_set import RaySet
+    >>> writable_format(Path("led.dat"), RaySet([[0, 0, 0]], [[0, 0, 1]], [1.0])).name
+    'zemax'
+    """
     chosen = format_of_output(path, format)
     if len(rays) == 0:
         raise ArgumentError(f"{path}: there are no rays to write.")
@@ -177,14 +202,7 @@ def write_rays(
             f"{path}: {chosen.title} holds a position for every ray, and far-field rays have none; "
             f"at the origin they would look like a point source. Formats for far-field rays: {able}."
         )
-    notes: tuple[str, ...] = ()
-    if flux_unit is not None and isinstance(rays, RaySet):
-        rays = rays.in_unit(flux_unit)
-        if chosen.wants_watts(rays):
-            rays = rays.without_spectrum()
-            notes = (f"{chosen.title} holds wavelengths and spectra of rays beside W only: they are left out, for lm.",)
-    with atomic_output(path, size=chosen.least_size(rays)) as temporary:
-        return (*notes, *chosen.write(rays, temporary), *rays.notes)
+    return chosen
 
 
 OTHER_NAMES = {
