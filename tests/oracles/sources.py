@@ -408,25 +408,10 @@ class DieUnderDome:
         outside = self.index * inside + (cos_outside - self.index * cos_inside)[:, None] * normal
         return leaves, outside, self.transmittance(cos_inside=cos_inside, cos_outside=cos_outside)
 
-    @functools.cached_property
+    @property
     def die_flux(self) -> float:
-        """Of the die through the dome [lm]: Gauss rules on the six rectangles of the die, and on the disk of p, q."""
-        x0, x1, y0, y1 = self.die
-        p, q, w = _disk_rule(24)
-        total = 0.0
-        xs, ys = (x0, *self.finger, self.notch[0], x1), (y0, self.notch[1], y1)
-        for (a, b), (c, d) in itertools.product(itertools.pairwise(xs), itertools.pairwise(ys)):
-            (gx, wx), (gy, wy) = _gauss(8, a, b), _gauss(8, c, d)
-            x, y = (g.ravel() for g in np.meshgrid(gx, gy, indexing="ij"))
-            at = {
-                "x": np.repeat(x, len(p)),
-                "y": np.repeat(y, len(p)),
-                "p": np.tile(p, len(x)),
-                "q": np.tile(q, len(x)),
-            }
-            leaving = (self.die_luminance(**at) * self._exits(**at)[2]).reshape(len(x), len(p)) @ w
-            total += float(np.outer(wx, wy).ravel() @ leaving)
-        return total * MM2
+        """Of the die through the dome [lm], whatever the floor."""
+        return _die_flux(dataclasses.replace(self, floor=0.0))
 
     @functools.cached_property
     def total_flux(self) -> float:
@@ -466,3 +451,24 @@ class DieUnderDome:
         position, direction = _first(n, from_die())
         position[scattered], direction[scattered] = _first(int(scattered.sum()), from_floor())
         return position, direction
+
+
+@functools.cache
+def _die_flux(source: DieUnderDome) -> float:
+    """Of the die through the dome [lm]: Gauss rules on the six rectangles of the die, and on the disk of p, q."""
+    x0, x1, y0, y1 = source.die
+    p, q, w = _disk_rule(24)
+    total = 0.0
+    xs, ys = (x0, *source.finger, source.notch[0], x1), (y0, source.notch[1], y1)
+    for (a, b), (c, d) in itertools.product(itertools.pairwise(xs), itertools.pairwise(ys)):
+        (gx, wx), (gy, wy) = _gauss(8, a, b), _gauss(8, c, d)
+        x, y = (g.ravel() for g in np.meshgrid(gx, gy, indexing="ij"))
+        at = {
+            "x": np.repeat(x, len(p)),
+            "y": np.repeat(y, len(p)),
+            "p": np.tile(p, len(x)),
+            "q": np.tile(q, len(x)),
+        }
+        leaving = (source.die_luminance(**at) * source._exits(**at)[2]).reshape(len(x), len(p)) @ w
+        total += float(np.outer(wx, wy).ravel() @ leaving)
+    return total * MM2
