@@ -13,6 +13,7 @@ from etendue.extras import scipy_part
 from etendue.instruments.courses import FURTHEST, after, course_of
 from etendue.instruments.directional_operator import ForwardModel
 from etendue.instruments.directional_scan import DirectionalScan
+from etendue.instruments.shared_rays import together
 from etendue.instruments.stopping import Course
 
 Array = npt.NDArray[np.float64]
@@ -105,7 +106,8 @@ class CountedScan:
 def flux_per_count(scan: DirectionalScan) -> Array | None:
     """Of each position, from the variance of a count, which is itself; None if standard errors are not known.
 
-    Where the flux is too small to tell, as in the middle of all positions.
+    Where the flux is too small to tell, as in the middle of all positions. Where positions count the same rays, what is
+    smooth over the aperture sees fewer counts (`together`).
     """
     if scan.standard_error is None or not (scan.standard_error > 0.0).any():
         return None
@@ -113,5 +115,5 @@ def flux_per_count(scan: DirectionalScan) -> Array | None:
     sure = (whole > SURE * scan.standard_error) & (scan.standard_error > 0.0)
     if not sure.any():
         return None
-    per = np.divide(scan.standard_error**2, whole, out=np.zeros_like(whole), where=sure)
+    per = np.divide(scan.standard_error**2 * together(scan), whole, out=np.zeros_like(whole), where=sure)
     return np.where(sure, per, np.median(per[sure]))

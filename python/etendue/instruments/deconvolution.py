@@ -16,6 +16,7 @@ from etendue.instruments.courses import after, checked_replicates, course_of, ru
 from etendue.instruments.goniometer_scan import GoniometerScan, full_width, summit, total_scatter
 from etendue.instruments.operators import Operator, OperatorName, folded, middle_of, operator_of, sparse_if_large
 from etendue.instruments.penalised_lobe import PenalisedLobe, penalised_lobe
+from etendue.instruments.shared_rays import together
 from etendue.quantities.arguments import require, require_known, require_number
 from etendue.quantities.ray_stream import checked_seed
 
@@ -313,11 +314,14 @@ def _without_gaps(scan: GoniometerScan) -> GoniometerScan:
 
 
 def _gain(scan: GoniometerScan) -> float | None:
-    """The flux that one count stands for: the variance of a count is itself."""
+    """The flux that one count stands for: the variance of a count is itself.
+
+    Where positions count the same rays, what is smooth over the aperture sees fewer counts (`together`).
+    """
     if scan.standard_error is None or not (scan.standard_error > 0.0).any():
         return None
     total = float(np.sum(np.maximum(scan.flux + scan.background, 0.0)))
-    return float(np.sum(scan.standard_error**2)) / total if total > 0.0 else None
+    return float(np.sum(scan.standard_error**2 * together(scan))) / total if total > 0.0 else None
 
 
 def _after(model: Operator, measured: Array, background: float, count: int) -> Array:

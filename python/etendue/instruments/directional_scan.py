@@ -33,7 +33,7 @@ IN_PLANE = 1e-6
 """Sines of azimuths up to which directions lie in the plane of incidence: angles in files have few digits."""
 
 
-KNOWN = ("incidence", "background", "solid_angle")
+KNOWN = ("incidence", "background", "solid_angle", "shared_rays")
 """What lines say of scans in one plane and in two dimensions alike."""
 
 
@@ -58,6 +58,8 @@ class DirectionalScan:
         What the detector shows in the dark, in the unit of the flux: subtracted already.
     bench : Bench, optional
         The instrument.
+    shared_rays : int
+        Rays that all positions count, so that neighbours err together; 0 if each position has light of its own.
     notes : tuple of str
         What is worth knowing.
 
@@ -81,6 +83,7 @@ class DirectionalScan:
     incidence: float = 0.0
     background: float = 0.0
     bench: Bench | None = None
+    shared_rays: int = 0
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -122,6 +125,8 @@ class DirectionalScan:
             raise ArgumentError(f"a solid angle of {self.solid_angle} sr; give more than 0")
         if not 0.0 <= self.background < math.inf:
             raise ArgumentError(f"a background of {self.background}; give 0 or more")
+        if self.shared_rays < 0:
+            raise ArgumentError(f"shared_rays is {self.shared_rays}; give 0 or more")
 
     def __repr__(self) -> str:
         """Positions, and what was measured."""
@@ -251,6 +256,8 @@ class DirectionalScan:
         remarks: dict[str, object] = {"incidence": self.incidence, "background": self.background}
         if self.solid_angle is not None:
             remarks["solid_angle"] = self.solid_angle
+        if self.shared_rays:
+            remarks["shared_rays"] = self.shared_rays
         if self.bench is not None:
             remarks |= self.bench.remarks()
         theta, phi = angles_of(self.direction)

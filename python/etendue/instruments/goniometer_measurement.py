@@ -145,6 +145,7 @@ class Measurement:
             way=way,
             plane=plane,
             sample=True,
+            shared_rays=self._shared_rays,
             notes=notes,
         )
 
@@ -162,6 +163,7 @@ class Measurement:
             incidence=self.theta,
             background=self.counter.background,
             bench=self.bench,
+            shared_rays=self._shared_rays,
             notes=notes,
         )
 
@@ -180,6 +182,11 @@ class Measurement:
             wavelength=self.wavelength,
             standard_error=(error / per).reshape(grid.shape),
         )
+
+    @property
+    def _shared_rays(self) -> int:
+        """Rays that all positions count."""
+        return self.rays if self.method == "trace" and not self.fresh else 0
 
     def _clear(self, arms: Array) -> tuple[npt.NDArray[np.bool_], tuple[str, ...]]:
         """At which positions the head is not in the beam, shape (n,), and what is to be told of a scan."""
@@ -253,6 +260,7 @@ def _recorded(
     way: Way,
     plane: Plane,
     sample: bool,
+    shared_rays: int = 0,
     notes: tuple[str, ...] = (),
 ) -> GoniometerScan:
     """What the detector states of a flux."""
@@ -269,5 +277,6 @@ def _recorded(
         plane=plane,
         background=counter.background,
         sample=sample,
+        shared_rays=shared_rays,
         notes=notes,
     )

@@ -30,7 +30,7 @@ Way = Literal["transmitted", "reflected"]
 FINE = 16
 """Parts of a step between positions in which the total scatter is added up."""
 
-REMARKS = ("incidence", "background", "solid_angle", "way", "plane", "sample")
+REMARKS = ("incidence", "background", "solid_angle", "shared_rays", "way", "plane", "sample")
 """What lines of a file may say of a scan; others are remarks of people."""
 
 ALIKE = 0.8
@@ -92,6 +92,8 @@ class GoniometerScan:
         What the detector shows in the dark, in the unit of the flux: subtracted already.
     sample : bool
         Whether there was a sample in the beam.
+    shared_rays : int
+        Rays that all positions count, so that neighbours err together; 0 if each position has light of its own.
     notes : tuple of str
         What is worth knowing.
 
@@ -117,6 +119,7 @@ class GoniometerScan:
     plane: Plane = "in-plane"
     background: float = 0.0
     sample: bool = True
+    shared_rays: int = 0
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -151,6 +154,8 @@ class GoniometerScan:
             raise ArgumentError(f"a solid angle of {self.solid_angle} sr; give more than 0")
         if not 0.0 <= self.background < math.inf:
             raise ArgumentError(f"a background of {self.background}; give 0 or more")
+        if self.shared_rays < 0:
+            raise ArgumentError(f"shared_rays is {self.shared_rays}; give 0 or more")
 
     def __repr__(self) -> str:
         """Positions, and what was measured."""
@@ -266,7 +271,7 @@ class GoniometerScan:
         >>> back.flux.tolist(), back.solid_angle
         ([0.25, 0.5], 0.001)
         """
-        remarks = {
+        remarks: dict[str, object] = {
             "incidence": self.incidence,
             "way": self.way,
             "plane": self.plane,
@@ -275,6 +280,8 @@ class GoniometerScan:
         }
         if self.solid_angle is not None:
             remarks["solid_angle"] = self.solid_angle
+        if self.shared_rays:
+            remarks["shared_rays"] = self.shared_rays
         names = [*POSITIONS, *([ERROR] if self.standard_error is not None else [])]
         columns = [self.angle, self.flux, *([self.standard_error] if self.standard_error is not None else [])]
         rows = [",".join(repr(float(value)) for value in row) for row in zip(*columns, strict=True)]
@@ -368,6 +375,11 @@ def known_of(path: Path, remarks: Mapping[str, str]) -> dict[str, object]:
                 raise FormatError(path, f"# {key}", f"{remarks[key][:40]!r} is no number", "Mend the line.") from None
             if key == "incidence" and not 0.0 <= float(remarks[key]) < 90.0:
                 raise FormatError(path, f"# {key}", f"{remarks[key][:40]}°", "Light meets a sample at 0 to below 90°.")
+    if "shared_rays" in remarks:
+        if not remarks["shared_rays"].isdecimal():
+            told = f"{remarks['shared_rays'][:40]!r} is no number of rays"
+            raise FormatError(path, "# shared_rays", told, "Mend the line.")
+        found["shared_rays"] = int(remarks["shared_rays"])
     for key, choices in (("way", get_args(Way)), ("plane", get_args(Plane)), ("sample", ("yes", "no"))):
         if key in remarks:
             if remarks[key] not in choices:
