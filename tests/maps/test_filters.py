@@ -172,6 +172,9 @@ def test_a_dark_pixel_keeps_its_value(name: str, gamma: float) -> None:
     filtered = filter_map(make_map([[0.0, 5.0, 0.0]]), name, 3, gamma=gamma)
     assert filtered.values[0, 0] == 0.0
     assert filtered.rays[0, 0] == 10
+    # Also its error: what is known of a dark pixel to 3 is not known exactly.
+    noisy = make_map([[0.0, 5.0, -1.0]], np.array([[3.0, 0.5, 2.0]]))
+    assert filter_map(noisy, name, 3, gamma=gamma).standard_error[0, ::2].tolist() == [3.0, 2.0]
 
 
 def test_unknown_errors_and_counts_spread_to_those_who_use_them() -> None:
@@ -291,6 +294,14 @@ def test_selective_errors_hold_what_selection_does(name: str, rays: int) -> None
         assert difference.mean() > -limit * difference.std(ddof=1) / math.sqrt(12)
     assert "by selecting the pixels that are averaged, found on 24 maps" in filtered[0].notes[1]
     assert "optimistic" in filter_map(smoothed_before(maps[0]), name).notes[-1]
+
+
+def test_the_noise_of_pixels_that_are_dark_reaches_those_who_use_them() -> None:
+    """(8 ± 0) beside (0 ± 4) in a window that takes both: 2 for each mean of two; at 1e-6 of χ²(23)."""
+    filtered = filter_map(make_map([[8.0, 0.0]], np.array([[1e-9, 4.0]])), "selective", (1, 3), gamma=3.0)
+    low, high = 2.0 * np.sqrt(stats.chi2.ppf([0.5e-6, 1 - 0.5e-6], 23) / 23)
+    assert low < filtered.standard_error[0, 0] < high
+    assert filtered.standard_error[0, 1] == 4.0
 
 
 def test_a_map_that_is_exact_stays_exact() -> None:

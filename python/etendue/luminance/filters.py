@@ -348,8 +348,8 @@ def _redrawn_variance(stack: _Stack, filtered: _Stack, weights: tuple[Array, Arr
         sums += deviation
         squares += deviation**2
     variance = np.maximum(squares - sums**2 / draws, 0.0) / (draws - 1)
-    # Unknown errors reach all that used them.
-    return np.where(np.isnan(filtered.error), np.nan, variance)
+    # Unknown errors reach all that used them, and a pixel not above 0 keeps what it has.
+    return np.where(np.isnan(filtered.error) | ~(stack.value > 0.0), filtered.error, variance)
 
 
 def _selected_means(

@@ -22,11 +22,12 @@ def redrawn(known: Array, value: Array, error: Array, times: int) -> Iterator[Ar
     Parameters
     ----------
     known : array, shape (rows, columns)
-        What is drawn about; pixels not above 0 stay as they are.
+        What is drawn about; pixels not above 0 stay as they are, but for those of the last kind below.
     value, error : array, shape (rows, columns)
         The map whose noise it is and its standard errors, 0 or NaN where it has none, which is not so everywhere. A pixel
         is taken for the sum of a Poisson number of rays that contribute σ²/f each; where it has none, they are those of
-        the whole map, Σσ²/Σf. A pixel with a value and an error of 0 or NaN stays as it is in `known`.
+        the whole map, Σσ²/Σf. A pixel with a value and an error of 0 or NaN stays as it is in `known`; one with an error and
+        a value not above 0 errs normally.
     times : int
         How many.
 
@@ -47,9 +48,11 @@ def redrawn(known: Array, value: Array, error: Array, times: int) -> Iterator[Ar
     expected = np.divide(known, ray, out=np.zeros_like(known), where=drawn)
     few = drawn & (expected < MANY)
     many = drawn & ~few
+    plain = (error > 0.0) & ~(value > 0.0)
     generator = np.random.Generator(np.random.Philox(key=PURPOSE))
     for _ in range(times):
         again = known.copy()
         again[few] = ray[few] * generator.poisson(expected[few])
         again[many] = ray[many] * generator.normal(expected[many], np.sqrt(expected[many]))
+        again[plain] = generator.normal(known[plain], error[plain])
         yield again
