@@ -21,15 +21,46 @@ LENS: dict[str, Any] = {
 FILM = {"kind": "prismatic-film", "width": 4, "height": 4, "thickness": 1, "pitch": 1, "apex_angle": 90}
 SCENE = et.Scene(
     wavelength=500,
-    media={"glass": {"index": 1.5}},
-    finishes={"wall": {"kind": "lambertian", "reflectance": 0.5}},
+    media={
+        "glass": {"index": 1.5, "absorption": 0.1},
+        "smoke": {
+            "sellmeier": {"b": [1.0], "c": [0.01]},
+            "absorption": {"wavelength": [400, 600], "values": [0.1, 0.2]},
+        },
+    },
+    finishes={
+        "wall": {"kind": "lambertian", "reflectance": 0.5},
+        "foil": {
+            "kind": "mirror",
+            "reflectance": {"angle": [0, 60], "wavelength": [400, 600], "values": [[0.1, 0.2], [0.3, 0.4]]},
+        },
+        "lobe": {"kind": "gaussian", "peak": 2, "sigma": 0.1},
+    },
     sources=[
         {"name": "die", "kind": "surface", "shape": {"kind": "disk", "radius": 1}, "flux": 3},
         {"kind": "point", "flux": 4},
         {"name": "white", "kind": "point", "flux": 2, "spectrum": [[450, 1], [600, 2]]},
     ],
     solids=[LENS, {"name": "film", "shape": FILM, "medium": "PMMA"}],
-    surfaces=[{"name": "a.b", "shape": {"kind": "disk", "radius": 9}, "finish": "wall"}],
+    surfaces=[
+        {"name": "a.b", "shape": {"kind": "disk", "radius": 9}, "finish": "wall"},
+        {
+            "name": "bowl",
+            "shape": {"kind": "asphere", "radius_of_curvature": 20, "coefficients": [1e-5, 1e-7], "radius": 5},
+            "trim": {"z": [0, 2], "radius": [1, 4]},
+            "finish": "foil",
+        },
+        {
+            "name": "kite",
+            "shape": {
+                "kind": "mesh",
+                "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]],
+                "triangles": [[0, 1, 2]],
+                "scale": 2,
+            },
+            "finish": "lobe",
+        },
+    ],
     detectors=[{"name": "die", "kind": "illuminance", "width": 1, "height": 1, "columns": 4, "rows": 2}],
     observers=[{"name": "eye", "distance": 100, "screen": {"width": 3, "height": 2, "columns": 4, "rows": 4}}],
 )
@@ -58,6 +89,25 @@ SCENE = et.Scene(
         ("finishes.wall.reflectance", 0.7, "", lambda s: s.finishes["wall"].to_dict()["reflectance"]),
         ("a.b.shape.radius", 4, "mm", lambda s: s.surfaces[0].shape.radius),
         ("wavelength", 600, "nm", lambda s: s.wavelength),
+        ("glass.absorption", 0.2, "1/mm", lambda s: s.media["glass"].absorption),
+        ("smoke.absorption.values.1", 0.3, "1/mm", lambda s: s.media["smoke"].absorption.values[1]),
+        ("smoke.absorption.wavelength.0", 410, "nm", lambda s: s.media["smoke"].absorption.wavelength[0]),
+        ("smoke.sellmeier.c.0", 0.02, "µm²", lambda s: s.media["smoke"].sellmeier.c[0]),
+        ("smoke.sellmeier.b.0", 1.1, "", lambda s: s.media["smoke"].sellmeier.b[0]),
+        (
+            "foil.reflectance.values.1.0",
+            0.35,
+            "",
+            lambda s: s.finishes["foil"].to_dict()["reflectance"]["values"][1][0],
+        ),
+        ("foil.reflectance.angle.1", 50, "°", lambda s: s.finishes["foil"].to_dict()["reflectance"]["angle"][1]),
+        ("lobe.peak", 3, "1/sr", lambda s: s.finishes["lobe"].peak),
+        ("lobe.sigma", 0.2, "", lambda s: s.finishes["lobe"].sigma),
+        ("bowl.shape.coefficients.1", 2e-7, "1/mm⁵", lambda s: s.surfaces[1].shape.coefficients[1]),
+        ("bowl.trim.z.1", 3, "mm", lambda s: s.surfaces[1].trim.z[1]),
+        ("bowl.trim.radius.0", 0.5, "mm", lambda s: s.surfaces[1].trim.radius[0]),
+        ("kite.shape.scale", 3, "", lambda s: s.surfaces[2].shape.scale),
+        ("eye.distance", 120, "mm", lambda s: s.observers[0].distance),
     ],
 )
 def test_a_number_is_found_and_changed_alone(path: str, value: float, unit: str, read: Any) -> None:

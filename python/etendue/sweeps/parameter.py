@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from annotated_types import Le
@@ -23,8 +23,24 @@ TABLES = ("media", "finishes")
 """Families whose parts are held by name."""
 
 DEGREES = ("angle", "spin", "rotation", "theta", "phi", "roll", "gamma_step", "apex_angle", "crease_angle")
-LENGTHS = ("target", "radius_of_curvature", "width", "height")
+LENGTHS = ("target", "radius_of_curvature", "width", "height", "distance", "z", "radius")
 """Keys of angles, and of lengths that have not the limit which tells all others."""
+
+OTHERS = {
+    "wavelength": "nm",
+    "absorption": "1/mm",
+    "sellmeier.c": "µm²",
+    "scale": "",
+    "peak": "1/sr",
+    "b0": "1/sr",
+    "a": "1/sr",
+}
+"""Units of other keys, by their ends."""
+
+COEFFICIENTS = "coefficients"
+"""Of aspheres: A₄ r⁴ + A₆ r⁶ + … is a length."""
+
+SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 Word = str | int
 """A step of a path: a key, a name, or a number from 0."""
@@ -85,16 +101,19 @@ class Parameter:
         head, rest = _part(scene, text)
         words, value = list(head), _at(scene, head)
         told, annotation, key = _called(scene, head, text), None, ""
+        keys: list[str] = []
         for word in rest:
             step: Word
             if isinstance(value, Description):
                 step, annotation, key = _key(value, word, told), _annotation(value, word), word
+                # The values of a table are what the table is of.
+                keys += [] if word == "values" and keys else [word]
                 value = getattr(value, value.names_by_key()[word])
             elif isinstance(value, Mapping):
                 if word not in value:
                     raise UnknownNameError(f"name in {told}", word, value)
                 step, value = word, value[word]
-            elif isinstance(value, tuple):
+            elif isinstance(value, tuple | list):
                 step = _number_in(value, word, told)
                 value = value[step]
             else:
@@ -105,7 +124,9 @@ class Parameter:
             raise ArgumentError(f"{path}: {_why_not(value, told)}")
         if key == "spectrum":  # rows of wavelength and share
             return cls(path, tuple(words), "nm" if words[-1] == 0 else "")
-        return cls(path, tuple(words), flux_unit if key == "flux" else _unit(key, annotation))
+        if key == COEFFICIENTS and isinstance(words[-1], int):
+            return cls(path, tuple(words), f"1/mm{str(2 * words[-1] + 3).translate(SUPERSCRIPTS)}")
+        return cls(path, tuple(words), flux_unit if key == "flux" else _unit(keys, annotation))
 
     def changed(self, scene: Scene, value: float) -> Scene:
         """The scene with another number here, checked as a whole file is.
@@ -219,7 +240,7 @@ def _key(part: Description, word: str, told: str) -> str:
     raise UnknownNameError(f"key of {told}", word, known)
 
 
-def _number_in(row: tuple[Any, ...], word: str, told: str) -> int:
+def _number_in(row: Sequence[Any], word: str, told: str) -> int:
     if not word.isdigit() or int(word) >= len(row):
         raise ArgumentError(
             f"{told}.{word}: {told} is a row of {len(row)} values; they are numbered from 0 to {len(row) - 1}."
@@ -238,7 +259,7 @@ def _why_not(value: Any, told: str) -> str:
     if isinstance(value, Description):
         keys = [key for key, name in value.names_by_key().items() if name not in value.IN_MEMORY and key != "kind"]
         return f"{told} is no number; name one of its keys: {', '.join(f'{told}.{key}' for key in keys)}."
-    if isinstance(value, tuple):
+    if isinstance(value, tuple | list):
         return f"{told} is a row of {len(value)} values; name one, numbered from 0, e.g. {told}.0."
     if isinstance(value, Mapping):
         return f"{told} is a table; name one of its entries: {', '.join(value) or 'it has none'}."
@@ -252,12 +273,14 @@ def _annotation(part: Description, word: str) -> Any:
     return (field.annotation, *field.metadata)
 
 
-def _unit(key: str, annotation: Any) -> str:
-    """The unit of a key, by its name or by the limit that all lengths have."""
+def _unit(keys: list[str], annotation: Any) -> str:
+    """The unit of what the last key holds, by its name or by the limit that all lengths have."""
+    key = keys[-1] if keys else ""
     if key in DEGREES:
         return "°"
-    if key == "wavelength":
-        return "nm"
+    for end in (".".join(keys[-2:]), key):
+        if end in OTHERS:
+            return OTHERS[end]
     return "mm" if key in LENGTHS or repr(Le(LONGEST)) in repr(annotation) else ""
 
 
