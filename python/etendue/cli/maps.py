@@ -20,7 +20,7 @@ from etendue.plot.map_picture import plot_map
 from etendue.plot.region_marks import check_number
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.luminance_map import LuminanceMap
-from etendue.quantities.measured import measured
+from etendue.quantities.measured import measured, measured_pixel
 from etendue.quantities.observer import Screen
 from etendue.quantities.powers_of_ten import counted, rounded
 from etendue.quantities.unlifted import unlifted
@@ -131,12 +131,7 @@ def _largest_apart(lmap: LuminanceMap) -> float:
 def _maximum(lmap: LuminanceMap) -> str:
     """The largest luminance with its error, and the largest pixel if chance lifts that by more than half of its error."""
     largest, error = float(np.nanmax(lmap.values)), float(lmap.standard_error.flat[np.nanargmax(lmap.values)])
-    apart = _largest_apart(lmap)
-    if not largest - apart > 0.5 * error:
-        return measured(largest, error, lmap.unit)
-    if apart < error:
-        return f"not known (chance alone may have made the largest pixel, {counted(largest, lmap.unit)})"
-    return f"{measured(apart, error, lmap.unit)} (largest pixel {counted(largest, lmap.unit)}, lifted by chance)"
+    return measured_pixel(largest, error, _largest_apart(lmap), lmap.unit)
 
 
 def _print_regions(lmap: AnyMap, regions: Sequence[AnyRegion]) -> None:

@@ -67,6 +67,32 @@ def measured_largest(value: float, error: float, largest: float, unit: str) -> s
     return f"{told} (largest value {counted(largest, unit)}, lifted by chance)"
 
 
+def measured_pixel(largest: float, error: float, apart: float, unit: str) -> str:
+    """The largest pixel of a map with its error; without the lift of chance, if that is more than half of the error.
+
+    Parameters
+    ----------
+    largest, error : float
+        The pixel and its standard error.
+    apart : float
+        What it is less the lift (`unlifted`).
+    unit : str
+        Of all three.
+
+    Examples
+    --------
+    >>> measured_pixel(3560.0, 92.0, 3540.0, "cd/m²"), measured_pixel(3560.0, 92.0, 3410.0, "cd/m²")
+    ('3560 ± 92 cd/m²', '3410 ± 92 cd/m² (largest pixel 3560 cd/m², lifted by chance)')
+    >>> measured_pixel(3560.0, 2100.0, 100.0, "cd/m²")
+    'not known (chance alone may have made the largest pixel, 3560 cd/m²)'
+    """
+    if not largest - apart > 0.5 * error:
+        return measured(largest, error, unit)
+    if apart < error:
+        return f"not known (chance alone may have made the largest pixel, {counted(largest, unit)})"
+    return f"{measured(apart, error, unit)} (largest pixel {counted(largest, unit)}, lifted by chance)"
+
+
 def peak_line(found: Intensity) -> str:
     """The peak of a distribution with its error and direction.
 

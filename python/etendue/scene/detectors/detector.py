@@ -15,6 +15,7 @@ from etendue.description.keys import Description
 from etendue.quantities.node_choice import Choice
 from etendue.quantities.pixel_map import PixelMap
 from etendue.quantities.provenance import Provenance
+from etendue.quantities.unlifted import unlifted
 from etendue.scene.dealing import Array, CellSums, Dealing
 from etendue.scene.observers import ObserverKeys
 from etendue.units import FluxUnit
@@ -204,7 +205,7 @@ class Detector(Description, abc.ABC):
 
 
 def brightest_of(quantity: PixelMap) -> dict[str, Any]:
-    """The brightest pixel or cell of a map, and how many there are, as plain data for JSON.
+    """The brightest pixel or cell of a map, also without what chance lifts it by, and how many there are, as data for JSON.
 
     Examples
     --------
@@ -218,6 +219,7 @@ def brightest_of(quantity: PixelMap) -> dict[str, Any]:
     return {
         "maximum": float(quantity.values[brightest]),
         "maximum_error": float(quantity.standard_error[brightest]),
+        "maximum_apart": unlifted(quantity.values, quantity.standard_error, np.ones(quantity.values.shape)).value,
         "unit": quantity.unit,
         "columns": columns,
         "rows": rows,

@@ -9,8 +9,8 @@ from typing import Any, Literal, Self
 from etendue.description.files import Files
 from etendue.errors import UnknownNameError
 from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.measured import measured_pixel
 from etendue.quantities.observer import Observer, Screen, observer_from_dict
-from etendue.quantities.powers_of_ten import counted
 from etendue.scene.detectors.detector import Detection, Detector, Record, Recorded, Setting, brightest_of
 from etendue.scene.observers import ObserverKeys
 from etendue.units import MM2_PER_M2
@@ -62,8 +62,10 @@ class DiffuseLuminance(Detection[LuminanceMap]):
         )
 
     def summary(self, quantity: LuminanceMap) -> str:
-        """The brightest pixel."""
-        return f"maximum {counted(float(quantity.values.max()), quantity.unit)}"
+        """The brightest pixel, without what chance lifts it by."""
+        found = brightest_of(quantity)
+        largest, error, apart = (found[key] for key in ("maximum", "maximum_error", "maximum_apart"))
+        return f"maximum {measured_pixel(largest, error, apart, quantity.unit)}"
 
     def figures(self, quantity: LuminanceMap) -> dict[str, Any]:
         """The brightest pixel, and how many there are."""
