@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import tempfile
@@ -14,6 +15,12 @@ import pytest
 # The same examples in every run: a failure is a failure, not a draw.
 hypothesis.settings.register_profile("fixed", derandomize=True, deadline=None)
 hypothesis.settings.load_profile("fixed")
+# Nor do they hang on which modules were imported before: numbers and texts of their source are among the examples otherwise,
+# and to sift thousands of them takes most of the time of some tests. Early versions have no such thing.
+with contextlib.suppress(ImportError):
+    from hypothesis.internal.conjecture import providers
+
+    providers._get_local_constants = lambda: providers._local_constants
 
 # What a test fits, it fits: only the tests of the cache name a folder.
 os.environ["ETENDUE_CACHE_DIR"] = ""

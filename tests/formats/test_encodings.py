@@ -86,7 +86,6 @@ def test_maps_and_tables_without_a_mark(encoding: str, tmp_path: Path) -> None:
             read(tmp_path / name)
 
 
-@pytest.mark.slow
 @given(st.binary(max_size=40), st.sampled_from([b"", b"\xff\xfe", b"\xfe\xff", b"\xff\xfe\0\0", b"\0\0\xfe\xff"]))
 def test_any_bytes_are_a_text_or_an_error(data: bytes, mark: bytes) -> None:
     wide_encoding(mark + data)

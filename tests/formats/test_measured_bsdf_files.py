@@ -85,7 +85,6 @@ def test_pab_directions_and_quantities(tmp_path: Path, quantity: str) -> None:
     assert float(one.projected.sum()) == pytest.approx(math.pi, rel=1e-6)
 
 
-@pytest.mark.slow
 def test_files_of_single_incidences_are_read_together(tmp_path: Path) -> None:
     paths = [tmp_path / f"{theta}.dat" for theta in (30, 60)]
     for path, theta in zip(paths, (30.0, 60.0), strict=True):

@@ -327,7 +327,6 @@ def test_a_turned_sample() -> None:
 # --- what is not as it should be ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 def test_gaps_and_negative_fluxes_are_told_and_survived() -> None:
     scan = counted(scan=exact_scan("gaussian"), peak=1e4, seed=3)
     hole = np.linalg.norm(scan.direction - direction(62.0, 0.0), axis=1) > 0.02

@@ -85,7 +85,6 @@ def test_a_recalled_field_tells_the_notes_of_the_rays_as_they_are_now(fits: list
         assert told.notes[len(told.notes) - len(notes) :] == notes
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_another_ray_surface_unit_or_program_is_another_fit(fits: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     rays = led()
@@ -137,7 +136,6 @@ def test_a_damaged_file_is_made_anew(folder: Path, fits: list[int]) -> None:
     assert len(fits) == 2
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_the_folder_is_bounded_and_what_was_used_last_stays(fits: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     sets = [led(seed) for seed in range(4)]
