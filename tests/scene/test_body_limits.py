@@ -40,7 +40,7 @@ BICONVEX = {"front": {"radius_of_curvature": 5}, "back": {"radius_of_curvature":
         ("PrismaticFilm", {"width": 1, "height": 1, "thickness": 1, "pitch": 3}, "0.333333 prisms"),
         ("PrismaticFilm", {"width": 1, "height": 1, "thickness": 1, "pitch": 1, "apex_angle": 180}, "1° to 179°"),
         ("Prism", {"vertices": [(0, 0), (1, 1), (1, 0), (0, 1)], "height": 1}, "sides 0 and 2 touch or cross"),
-        ("Prism", {"vertices": [(0, 0), (1, 1)], "height": 1}, "at least 3 items"),
+        ("Prism", {"vertices": [(0, 0), (1, 1)], "height": 1}, "has 2 values; it must have 3 at least"),
         ("Torus", {"major_radius": 1, "minor_radius": 1}, "less than 'major_radius'"),
         ("Ball", {"radius": 1e300}, "at most 1e[+]09"),
     ],
