@@ -92,7 +92,9 @@ def test_a_ramp_along_any_coordinate_has_a_straight_curve(axis: int) -> None:
 def test_factors_count_between_the_centres_of_cells() -> None:
     """L = x·a with both factors finer than the grid: P(x·a > t) = 1 - t + t ln t for uniform x and a."""
     rows = np.repeat(ramp(256)[:, None], 256, axis=1)
-    curve = characteristic_curve(field_of(PLANE, part(np.ones((2, 2, 2, 2)), 1.0, space=rows, direction=rows)), points=1 << 17)
+    curve = characteristic_curve(
+        field_of(PLANE, part(np.ones((2, 2, 2, 2)), 1.0, space=rows, direction=rows)), points=1 << 17
+    )
     t = np.array([0.9, 0.7, 0.4, 0.2, 0.05])
     found = np.interp(-t * 1e6, -curve.luminance, (np.append(0.0, curve.etendue[:-1]) + curve.etendue) / 2)
     np.testing.assert_allclose(found / WHOLE, 1 - t + t * np.log(t), atol=1e-3)
