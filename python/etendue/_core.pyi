@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
+    "BrightSpots",
     "Bsdf",
     "Dealing",
     "FarField",
@@ -291,6 +292,14 @@ class Glints:
         """Number of pixels that have some."""
 
 @final
+class BrightSpots:
+    """Small places of diffuse surfaces that much light comes from, from scatter events (n, 15), if there are such."""
+
+    def __new__(cls, scene: Scene, events: npt.NDArray[np.uint64]) -> BrightSpots: ...
+    def exist(self) -> bool:
+        """Whether there are such places."""
+
+@final
 class Guide:
     """Directions in which lines of sight go on from diffuse surfaces by preference, from the arrivals of a trace."""
 
@@ -479,13 +488,13 @@ class Dealing:
         """Units of each stratum among the first `done` rays."""
 
     def units(self, rays: npt.NDArray[np.uint64]) -> tuple[_Numbers, _Numbers, _Floats]:
-        """By the rays' numbers in the run: the unit of each, its stratum, and its flux in the whole run over that of the ray."""
+        """By the rays' numbers: the unit of each, its stratum, and its flux in the whole run over that of the ray."""
 
     def join(self, open: _Units, copies: _Units, done: int) -> tuple[npt.NDArray[np.uint32], _Numbers, _Cells, _Units]:
         """Adds units of rays with copies to open ones, when `done` rays are given out.
 
-        Cell, stratum and (Σ w, Σ w², units, Σ w v) of what grows, each cell of a stratum once; and the units of which more copies
-        may come.
+        Cell, stratum and (Σ w, Σ w², units, Σ w v) of what grows, each cell of a stratum once; and the units of which more
+        copies may come.
         """
 
 def losses() -> list[str]:
@@ -528,6 +537,7 @@ def look_at_scene(
     shared: float | None = None,
     guide: Guide | None = None,
     glints: Glints | None = None,
+    spots: BrightSpots | None = None,
 ) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Floats, tuple[float, float]]:
     """What lines of sight find in each of the passes ``first..last`` of `paths` paths, each array (passes, rows, columns).
 
@@ -550,8 +560,9 @@ def look_at_events(
     view: _View,
     threads: int | None = None,
 ) -> _Cells:
-    """The light image of stored scatter events (n, 15), whose rays with all their copies bring such fluxes, as cells. The rows
-    of a ray follow each other.
+    """The light image of stored scatter events (n, 15), as cells; the rows of a ray follow each other.
+
+    `brought` is the flux of the ray of each, its copies included.
     """
 
 def deepest() -> int:

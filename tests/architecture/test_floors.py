@@ -243,7 +243,6 @@ WITHOUT_EXAMPLE = {
     "etendue.luminance.methods.Method": "what Cone, FromField and PathTracing share, which show it",
     "etendue.luminance.source_kinds.SourceKind": "a row of a table; tests/luminance/test_methods.py shows it",
     "etendue.luminance.method_choice.Spelling": "how messages name options; tests/luminance/test_methods.py shows both",
-    "etendue.scene.scene.ReadFrom": "a part of a Scene, which reading files fills in",
     "etendue.quantities.hat_sums.HatSums": "what Hats.sums returns, shown in its example",
     "etendue.quantities.node_choice.Choice": "what choose_nodes returns",
     "etendue.tracing.far_fields.far_field_nodes": "a step of trace_rounds, which shows it",

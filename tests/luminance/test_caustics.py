@@ -156,7 +156,7 @@ def test_trapped_light_costs_a_small_map_little(monkeypatch: pytest.MonkeyPatch)
     with monkeypatch.context() as counting:
         counting.setattr(_core, "work_unit", counted)
         lmap = et.luminance_map(scene, eye, screen, rays_per_pixel=4)
-    assert len(segments) == 3  # scouts, pilot, light image
+    assert len(segments) == 4  # scouts, pilot, bright places, light image
     assert sum(segments) < MOST_SEGMENTS
     assert any("rays forwards, and 4,096 beforehand" in note for note in lmap.notes)
     # Where rays are given up sooner, more of them are the same effort; they still outlast those of a pilot.

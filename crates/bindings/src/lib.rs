@@ -3,6 +3,7 @@
 //! Nothing is computed here. Each file converts one noun, releases the interpreter while the core works, and comes back
 //! between rounds of batches to report progress and to honour Ctrl-C.
 
+mod bright_spots;
 mod bsdf;
 mod carrier;
 mod cone;
@@ -45,6 +46,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<far_field::FarField>()?;
     module.add_class::<glints::Glints>()?;
     module.add_class::<guide::Guide>()?;
+    module.add_class::<bright_spots::BrightSpots>()?;
     module.add_class::<survey::Survey>()?;
     module.add_class::<dealing::Dealing>()?;
     module.add_function(wrap_pyfunction!(source::read_rays, module)?)?;

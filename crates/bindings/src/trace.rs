@@ -26,6 +26,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
+use crate::bright_spots::BrightSpots;
 use crate::carrier::vectors;
 use crate::glints::Glints;
 use crate::guide::Guide;
@@ -217,7 +218,7 @@ type Looks<'py> = (
 /// lines still had when they were given up, having met as many surfaces as they may, and when they were lost.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
-#[pyo3(signature = (scene, view, paths, seed, most_events, left, first, last, threads=None, survey=None, shared=None, guide=None, glints=None))]
+#[pyo3(signature = (scene, view, paths, seed, most_events, left, first, last, threads=None, survey=None, shared=None, guide=None, glints=None, spots=None))]
 pub fn look_at_scene<'py>(
     py: Python<'py>,
     scene: &Scene,
@@ -233,6 +234,7 @@ pub fn look_at_scene<'py>(
     shared: Option<f64>,
     guide: Option<&Guide>,
     glints: Option<&Glints>,
+    spots: Option<&BrightSpots>,
 ) -> PyResult<Looks<'py>> {
     let view = view.core();
     let left = match left {
@@ -247,6 +249,7 @@ pub fn look_at_scene<'py>(
         most_events,
         left,
         guide: guide.map(Guide::core),
+        spots: spots.and_then(BrightSpots::core),
         glints: glints.map(Glints::core),
     };
     let image = stoppable(py, |stop| {

@@ -62,12 +62,12 @@ impl Dealing {
         };
         dealing.counts = dealing.edges(rays).windows(2).map(|pair| pair[1] - pair[0]).collect();
         // Those without copies first.
-        let shared = |number| sets.iter().flatten().filter(|other| other.0 == number).count() > 1;
+        let is_of_several = |number| sets.iter().flatten().filter(|other| other.0 == number).count() > 1;
         for with_copies in [false, true] {
             let mut strata: Vec<(usize, usize)> = Vec::new();
             for (source, set) in sets.iter().enumerate() {
                 let Some((number, length)) = *set else { continue };
-                let has_copies = shared(number) || dealing.counts[source] > length;
+                let has_copies = is_of_several(number) || dealing.counts[source] > length;
                 let alone = sets.len() == 1 && !has_copies;
                 if has_copies != with_copies || alone || !(1..LONGEST).contains(&length) {
                     continue;

@@ -13,9 +13,10 @@
 //!
 //! `reverse`: from the observer to the sources; `lit_scene`: a scene with what its sources need to be seen; `exitance_cells` and
 //! `exitance`: the light of diffuse surfaces, known beforehand, at which paths may end; `guide`: where they go on from diffuse
-//! surfaces; `glints`: where in a pixel they look for small images of sources; `mis`: light that both directions find.
+//! surfaces, `bright_spots`: small places that they go on to; `glints`: where in a pixel they look for small images of sources; `mis`: light that both directions find.
 //! `buckets`: what rays of a block are sorted into.
 
+pub mod bright_spots;
 mod buckets;
 pub mod camera_connection;
 pub mod dealing;

@@ -51,6 +51,9 @@ LONG = MOST_SEGMENTS // (STEP * BATCH)
 """Ways of a ray, by the scouts, beyond which a step would take more than `MOST_SEGMENTS`, as where glass traps light: steps
 are then smaller, and rays are given up early. A pilot only advises; no light of the map rests on what its rays bring."""
 
+SPOT_RAYS, SPOT_EVENTS = 1 << 13, 4
+"""Rays that tell where light is scattered, and surfaces that each of them meets at most."""
+
 SMALL_BATCH, FEW_EVENTS = BATCH >> 4, 1 << 9
 """Rays of a batch, and surfaces that a ray may meet, in a pilot whose rays are long."""
 
@@ -237,6 +240,16 @@ def plan(
         for view, total, small in zip(views, sums, glints, strict=True)
     ]
     return Plan(max(wanted), guide, glints, done)
+
+
+def bright_spots(record: Mapping[str, Any], threads: int | None) -> _core.BrightSpots:
+    """Small places of diffuse surfaces that much light comes from, as of a wall close to a lamp.
+
+    A few rays forwards tell where light is scattered for the first few times, the same ones for all maps of a scene.
+    """
+    core = core_scene({**record, "detectors": [{"kind": "scatter", "most": 16 * SPOT_RAYS * SPOT_EVENTS}]})
+    traced = _core.work_unit(core, SPOT_RAYS, PILOT, SPOT_EVENTS, 0, 1, threads, SPOT_RAYS)
+    return _core.BrightSpots(core, traced["events"][0][0])
 
 
 def _rays(

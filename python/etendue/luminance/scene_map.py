@@ -15,7 +15,7 @@ from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.lightfield.light_field import LightField
-from etendue.luminance.caustics import Forward, LightImages, Plan, plan
+from etendue.luminance.caustics import SPOT_RAYS, Forward, LightImages, Plan, bright_spots, plan
 from etendue.luminance.gathering import (
     FIRST_CHECK,
     LEAST_LINES,
@@ -59,6 +59,11 @@ MOST_EVENTS = 10_000
 GIVEN_UP = 1e-4
 """Share of the weight of all lines that may be given up, or lost, without a word."""
 
+SPOTS = (
+    "of what diffuse surfaces see, a part is looked for at small bright places of others, as beside a lamp, which "
+    f"{SPOT_RAYS:,} rays forwards found"
+)
+
 
 class SeenScene:
     """A scene that is ready to be looked at, from one observer or from many, one after the other.
@@ -83,8 +88,14 @@ class SeenScene:
         self.compiled = compile_scene(seeable)
         if not self.compiled.record["sources"]:
             raise ArgumentError(f"{scene.name or 'the scene'} has no source: there is nothing to see.")
+        self._threads = threads
         self.core = core_scene({**self.compiled.record, "detectors": []})
         self.origin = Provenance(scene.name or "scene", "traced scene", fingerprint(self.compiled.record))
+
+    @cached_property
+    def spots(self) -> _core.BrightSpots:
+        """Small bright places of its surfaces."""
+        return bright_spots(self.compiled.record, self._threads)
 
 
 def look_at_scene(
@@ -117,6 +128,8 @@ def look_at_scene(
     images = forward.images
     notes = [*compiled.notes, *seen.notes, *_unseen(compiled, forwards=scattered is not None or images is not None)]
     notes += [] if scattered is not None else forward.notes(how)
+    spots = None if how.forward_rays == 0 else seen.spots
+    notes += [SPOTS] if spots is not None and spots.exist() else []
     left: Left = "scattered" if scattered is not None else "caustics" if images is not None else "nothing"
     surveys = _Surveys(core, compiled.record, how.seed, threads)
     maps, done = [], 0
@@ -131,7 +144,7 @@ def look_at_scene(
             small: _core.Glints = small,
         ) -> list[list[Array]]:
             nonlocal given_up, lost
-            guides = forward.shared, forward.plan.guide, small
+            guides = forward.shared, forward.plan.guide, small, spots
             *found, weights = _core.look_at_scene(
                 core, view, how.paths, how.seed, MOST_EVENTS, left, first, last, threads, known, *guides
             )

@@ -51,7 +51,13 @@ NotTooMany = BeforeValidator(_not_too_many)
 
 @dataclasses.dataclass(frozen=True)
 class ReadFrom:
-    """The file that a scene was read from: what messages call it. Scenes that differ in this alone are equal."""
+    """The file that a scene was read from: what messages call it. Scenes that differ in this alone are equal.
+
+    Examples
+    --------
+    >>> ReadFrom("room.toml") == ReadFrom("hall.toml")
+    True
+    """
 
     file: str = dataclasses.field(default="", compare=False)
 

@@ -7,6 +7,7 @@ use etendue_optics::bsdf::{Bsdf, Outward};
 
 use super::method::LeftOut;
 use super::path_block::{Branch, Connection, PathBlock, Seen};
+use crate::bright_spots::Towards;
 use crate::exitance_cells::FacePoint;
 use crate::guide::{self, Near};
 use crate::mis::{density, power_weight};
@@ -24,12 +25,38 @@ pub(super) enum Known<'a> {
     But(&'a dyn Bsdf),
 }
 
+/// What directions are drawn about by preference.
+#[allow(clippy::large_enum_variant, reason = "one at a time, on the stack")]
+enum Aim<'a> {
+    /// Those that light is known to come from through smooth surfaces.
+    Guide(Near<'a>),
+    Spots(Towards),
+}
+
+impl Aim<'_> {
+    /// Of a direction \[1/sr\].
+    fn density(&self, k: Vec3) -> f64 {
+        match self {
+            Self::Guide(near) => near.density(k),
+            Self::Spots(spots) => spots.density(k),
+        }
+    }
+
+    /// A direction from three numbers.
+    fn draw(&self, numbers: [f64; 3]) -> Vec3 {
+        match self {
+            Self::Guide(near) => near.draw(numbers),
+            Self::Spots(spots) => spots.draw(numbers),
+        }
+    }
+}
+
 /// How the directions are spread in which paths go on from a diffuse surface.
 struct Spread<'a> {
     /// Shares of those that go on on this side of the surface and on the other one, as its BSDF draws them.
     chances: [f64; 2],
-    /// Directions that light is known to come from, and the share of paths that go on in one of those.
-    guide: Option<(Near<'a>, f64)>,
+    /// Directions by preference, and the share of paths that go on in one of those.
+    aim: Option<(Aim<'a>, f64)>,
 }
 
 impl Spread<'_> {
@@ -37,9 +64,9 @@ impl Spread<'_> {
     #[inline]
     fn density(&self, k: Vec3, light: &Incoming, of_side: f64) -> f64 {
         let drawn = self.chances[usize::from(light.transmitted)] * of_side;
-        self.guide
+        self.aim
             .as_ref()
-            .map_or(drawn, |(near, share)| (1.0 - share) * drawn + share * near.density(k))
+            .map_or(drawn, |(aim, share)| (1.0 - share) * drawn + share * aim.density(k))
     }
 }
 
@@ -99,16 +126,23 @@ impl PathBlock<'_> {
         // What the observer sees directly is left to rays traced forwards; the rest is looked for where they came from.
         let guide = self.method.guide.filter(|_| !branch.direct);
         let guide = guide.and_then(|guide| guide.near(interaction.face, interaction.point));
-        let guide = guide.map(|near| (near, guide::share(branch.scatters)));
-        let spread = Spread { chances, guide };
-        let guided = guide.and_then(|(near, share)| {
-            let numbers = self.numbers(branch.path);
-            let number = numbers.draw() / share;
-            (number < 1.0).then(|| near.draw([number, height, turn]))
+        // Whether to follow a guide is drawn by one of the first numbers: by it few lines find most of the light. With spots, that
+        // comes after the numbers of connections, which then are as evenly spread as without.
+        let early = guide.is_some().then(|| self.numbers(branch.path).draw());
+        let share = guide::share(branch.scatters);
+        let aim = guide.map(|near| (Aim::Guide(near), share)).or_else(|| {
+            let spots = self.method.spots?;
+            let towards = spots.towards(interaction.point, interaction.side, chances[1] > 0.0)?;
+            let part = towards.part;
+            Some((Aim::Spots(towards), part * share))
         });
+        let spread = Spread { chances, aim };
         self.reach_out(&branch, (event, &outward), &spread, all);
-
-        let k = guided.unwrap_or_else(|| event.draw_incoming(&outward, through, [height, turn]));
+        let aimed = spread.aim.as_ref().and_then(|(aim, share)| {
+            let number = early.unwrap_or_else(|| self.numbers(branch.path).draw()) / share;
+            (number < 1.0).then(|| aim.draw([number, height, turn]))
+        });
+        let k = aimed.unwrap_or_else(|| event.draw_incoming(&outward, through, [height, turn]));
         let (light, density) = event.drawn_from(k, &outward);
         let share = light.f * light.cosine / spread.density(k, &light, density);
         if share > 0.0 {

@@ -1,5 +1,6 @@
 //! How a map is computed, and what is summed for each of its pixels.
 
+use crate::bright_spots::BrightSpots;
 use crate::glints::Glints;
 use crate::guide::Guide;
 use crate::mis::MisBalance;
@@ -30,6 +31,8 @@ pub struct Method<'a> {
     pub left: LeftOut,
     /// Where paths that do not see a diffuse surface directly go on from there, if that is known.
     pub guide: Option<&'a Guide>,
+    /// Small places of diffuse surfaces that a part of the paths goes on to, if there are such.
+    pub spots: Option<&'a BrightSpots>,
     /// Small images of sources, where as many paths again look for them, and four in each pass at least.
     pub glints: Option<&'a Glints>,
 }
