@@ -144,14 +144,21 @@ def test_a_stated_flux_has_its_unit(run: Run, keyword: str, told: str) -> None:
         (["a.ies", "-o", "none/b.ies"], 1, "does not exist"),
         (["led.tm25ray", "--gamma-step", "7"], 1, "does not divide"),
         (["nothing.ies"], 1, "nothing.ies"),
-        (["w.ies", "-o", "b.ldt"], 1, "luminous intensity only"),
     ],
 )
 def test_failures_leave_nothing(run: Run, tmp_path: Path, arguments: list[str], status: int, hint: str) -> None:
     et.write_intensity("a.ies", lid("none"))
-    et.write_intensity("w.ies", lid("none").replace(flux_unit="W"))
     before = sorted(tmp_path.iterdir())
     found, out, err = run(*arguments)
     assert (found, out) == (status, "")
     assert hint in err
     assert sorted(tmp_path.iterdir()) == before
+
+
+def test_what_a_format_does_not_take_is_told_beside_the_figures(run: Run, tmp_path: Path) -> None:
+    et.write_intensity("w.ies", lid("none").replace(flux_unit="W"))
+    found, out, err = run("w.ies", "-o", "b.ldt")
+    assert found == 1
+    assert out.startswith("radiant intensity")
+    assert "luminous intensity only" in err
+    assert [path.name for path in tmp_path.iterdir() if path.suffix == ".ldt"] == []

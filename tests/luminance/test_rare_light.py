@@ -140,6 +140,9 @@ def test_a_floor_that_sees_a_wall_with_a_lamp_close_to_it(gap: float, lines: int
     assert_agree(values=values, expected=expected, standard_error=error, degrees=REVERSE)
     assert np.sqrt(np.mean((values / expected - 1.0) ** 2)) < 3.0 / np.sqrt(lines)
     assert any("small bright places" in note for note in maps[0].notes)
+    one, seven = (et.luminance_map(scene, observer, screen, method=methods[0], threads=n) for n in (1, 7))
+    assert np.array_equal(one.values, values[0])
+    assert np.array_equal(seven.values, values[0])
 
 
 def test_even_light_has_no_small_bright_places() -> None:

@@ -10,6 +10,7 @@ use std::f64::consts::PI;
 
 use etendue_math::Vec3;
 use etendue_optics::source::surface::about;
+use multiversion::multiversion;
 
 /// Groups that scatters are cut into: a power of two.
 const GROUPS: usize = 64;
@@ -51,19 +52,24 @@ pub type Scatter = (Vec3, Vec3, f64);
 /// Spots of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BrightSpots {
-    spots: Vec<Spot>,
+    centre: [Numbers; 3],
+    radius: Numbers,
+    normal: [Numbers; 3],
 }
+
+/// A number of each group.
+type Numbers = [f64; GROUPS];
 
 /// Spots as they are seen from a point of a surface: cones of directions.
 #[derive(Clone, Copy, Debug)]
 pub struct Towards {
-    axes: [[f64; GROUPS]; 3],
+    axes: [Numbers; 3],
     /// 1 − the cosine of the half angle.
-    width: [f64; GROUPS],
+    width: Numbers,
     /// Density of the directions drawn in a cone \[1/sr\].
-    each: [f64; GROUPS],
+    each: Numbers,
     /// The chance of a cone and those before it.
-    below: [f64; GROUPS],
+    below: Numbers,
     count: usize,
     /// The part of the directions that are drawn so, of those that could be: the root of the share of the spots in what all
     /// groups send here.
@@ -80,41 +86,36 @@ impl BrightSpots {
         }
         let mut groups = Vec::with_capacity(GROUPS);
         cut(&mut scatters, GROUPS, &mut groups);
-        let found = Self { spots: groups };
-        let above = |spot: &Spot| spot.centre + spot.normal * spot.radius;
-        let needs = |spot: &&Spot| {
-            found
-                .seen(above(spot), |_| 1.0, VERY_BRIGHT)
-                .is_some_and(|seen| seen.part * seen.part >= LEAST.0)
+        let number = |of: fn(&Spot) -> f64| std::array::from_fn(|k| of(&groups[k]));
+        let found = Self {
+            centre: [number(|s| s.centre.x), number(|s| s.centre.y), number(|s| s.centre.z)],
+            radius: number(|s| s.radius),
+            normal: [number(|s| s.normal.x), number(|s| s.normal.y), number(|s| s.normal.z)],
         };
-        (found.spots.iter().filter(needs).count() >= LEAST.1).then_some(found)
+        let needs = |spot: &&Spot| {
+            let seen = found.seen(spot.centre + spot.normal * spot.radius, None, VERY_BRIGHT);
+            seen.is_some_and(|seen| seen.part * seen.part >= LEAST.0)
+        };
+        (groups.iter().filter(needs).count() >= LEAST.1).then_some(found)
     }
 
     /// The spots of a point of a surface with this normal, on its side or `through` it as well; None if there are none.
     #[must_use]
     pub fn towards(&self, point: Vec3, normal: Vec3, through: bool) -> Option<Towards> {
-        let counts = |axis: Vec3| {
-            let cosine = axis.dot(normal);
-            if through { cosine.abs() } else { cosine.max(0.0) }
-        };
-        self.seen(point, counts, BRIGHT)
+        self.seen(point, Some((normal, through)), BRIGHT)
     }
 
-    /// The spots of a point at which light from a direction counts by a cosine, and which are so bright at least.
-    fn seen(&self, point: Vec3, cosine: impl Fn(Vec3) -> f64, bright: f64) -> Option<Towards> {
-        let (mut all_axes, mut sines, mut weights) = ([[0.0; GROUPS]; 3], [0.0; GROUPS], [0.0; GROUPS]);
-        let mut all = 0.0;
-        for (k, spot) in self.spots.iter().enumerate() {
-            let to = spot.centre - point;
-            let inverse = 1.0 / to.dot(to).max(spot.radius * spot.radius).sqrt();
-            let axis = to * inverse;
-            for (list, x) in all_axes.iter_mut().zip([axis.x, axis.y, axis.z]) {
-                list[k] = x;
-            }
-            sines[k] = (spot.radius * inverse).max(NARROWEST);
-            // All groups have the same flux, and send it out by the cosine law, through a sheet as well.
-            weights[k] = cosine(axis) * axis.dot(spot.normal).abs() * inverse * inverse;
-            all += weights[k];
+    /// The spots of a point, of a surface or in space, which are so bright at least.
+    fn seen(&self, point: Vec3, surface: Option<(Vec3, bool)>, bright: f64) -> Option<Towards> {
+        let mut all = Sighted {
+            axes: [[0.0; GROUPS]; 3],
+            sine: [0.0; GROUPS],
+            cosine: [1.0; GROUPS],
+            weight: [0.0; GROUPS],
+        };
+        look(self, point, &mut all);
+        if let Some((normal, through)) = surface {
+            count_by_cosine(&mut all, normal, through);
         }
         let mut found = Towards {
             axes: [[0.0; GROUPS]; 3],
@@ -124,24 +125,23 @@ impl BrightSpots {
             count: 0,
             part: 0.0,
         };
-        let mut total = 0.0;
-        for k in 0..self.spots.len() {
-            let (sine, axis) = (sines[k], Vec3::from(all_axes.map(|list| list[k])));
-            // Of an even luminance L, a cone of half angle a would send π L cos sin² a, all directions π L.
-            // What does not lie above the surface is not seen; on the surface itself, it is rounding that says so.
-            let above = cosine(axis) > sine;
-            if sine >= WIDEST || !above || weights[k] <= bright * all * cosine(axis) * sine * sine {
+        let (whole, mut total) = (all.weight.iter().sum::<f64>(), 0.0);
+        for k in 0..GROUPS {
+            let (sine, cosine, weight) = (all.sine[k], all.cosine[k], all.weight[k]);
+            // Of an even luminance L, a cone of half angle a would send π L cos sin² a, all directions π L. What does not lie
+            // above the surface is not seen; on the surface itself, it is rounding that says so.
+            if sine >= WIDEST || cosine <= sine || weight <= bright * whole * cosine * sine * sine {
                 continue;
             }
             let n = found.count;
-            for (list, x) in found.axes.iter_mut().zip([axis.x, axis.y, axis.z]) {
-                list[n] = x;
+            for (list, from) in found.axes.iter_mut().zip(&all.axes) {
+                list[n] = from[k];
             }
             // 1 − √(1 − s²), as s is small.
             let width = sine * sine * (0.5 + 0.125 * sine * sine);
-            total += weights[k];
+            total += weight;
             found.width[n] = width;
-            found.each[n] = weights[k] / width;
+            found.each[n] = weight / width;
             found.below[n] = total;
             found.count += 1;
         }
@@ -149,24 +149,66 @@ impl BrightSpots {
             found.each[n] /= 2.0 * PI * total;
             found.below[n] /= total;
         }
-        found.part = (total / all).sqrt();
+        found.part = (total / whole).sqrt();
         (found.count > 0).then_some(found)
     }
+}
+
+/// All groups, seen from a point.
+struct Sighted {
+    axes: [Numbers; 3],
+    /// Of the half angle.
+    sine: Numbers,
+    /// By which light counts at the point.
+    cosine: Numbers,
+    /// What a group sends there. All have the same flux, and send it out by the cosine law, through a sheet as well.
+    weight: Numbers,
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn look(spots: &BrightSpots, point: Vec3, all: &mut Sighted) {
+    let ([x, y, z], [u, v, w]) = (&spots.centre, &spots.normal);
+    for k in 0..GROUPS {
+        let (a, b, c) = (x[k] - point.x, y[k] - point.y, z[k] - point.z);
+        let radius = spots.radius[k];
+        let inverse = 1.0 / (a * a + b * b + c * c).max(radius * radius).sqrt();
+        let (a, b, c) = (a * inverse, b * inverse, c * inverse);
+        all.axes[0][k] = a;
+        all.axes[1][k] = b;
+        all.axes[2][k] = c;
+        all.sine[k] = (radius * inverse).max(NARROWEST);
+        all.weight[k] = (a * u[k] + b * v[k] + c * w[k]).abs() * inverse * inverse;
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn count_by_cosine(all: &mut Sighted, normal: Vec3, through: bool) {
+    for k in 0..GROUPS {
+        let cosine = all.axes[0][k] * normal.x + all.axes[1][k] * normal.y + all.axes[2][k] * normal.z;
+        let cosine = if through { cosine.abs() } else { cosine.max(0.0) };
+        all.cosine[k] = cosine;
+        all.weight[k] *= cosine;
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn density(towards: &Towards, d: Vec3) -> f64 {
+    let [x, y, z] = &towards.axes;
+    let mut within = [0.0; GROUPS];
+    for k in 0..GROUPS {
+        // 1 − cos from the difference of unit vectors, which does not cancel.
+        let (u, v, w) = (d.x - x[k], d.y - y[k], d.z - z[k]);
+        let off = 0.5 * (u * u + v * v + w * w);
+        within[k] = if off <= towards.width[k] { towards.each[k] } else { 0.0 };
+    }
+    within.iter().sum()
 }
 
 impl Towards {
     /// Density of a direction \[1/sr\].
     #[must_use]
     pub fn density(&self, d: Vec3) -> f64 {
-        let [x, y, z] = &self.axes;
-        let mut sum = 0.0;
-        for k in 0..self.count {
-            // 1 − cos from the difference of unit vectors, which does not cancel.
-            let (u, v, w) = (d.x - x[k], d.y - y[k], d.z - z[k]);
-            let off = 0.5 * (u * u + v * v + w * w);
-            sum += if off <= self.width[k] { self.each[k] } else { 0.0 };
-        }
-        sum
+        density(self, d)
     }
 
     /// A direction from three numbers.

@@ -14,6 +14,9 @@ use crate::mis::{density, power_weight};
 use crate::scatter::{Incoming, SurfaceEvent};
 use crate::transmittance::transmittance;
 
+/// Diffuse scatters after which paths go on to bright spots: from later ones, a twentieth would at most.
+const SPOTS: u32 = 2;
+
 /// Sources up to this number are all connected to at the first diffuse scatter; of more, one is drawn (`LitScene::pick_source`).
 const FEW: usize = 8;
 
@@ -131,7 +134,7 @@ impl PathBlock<'_> {
         let early = guide.is_some().then(|| self.numbers(branch.path).draw());
         let share = guide::share(branch.scatters);
         let aim = guide.map(|near| (Aim::Guide(near), share)).or_else(|| {
-            let spots = self.method.spots?;
+            let spots = self.method.spots.filter(|_| branch.scatters < SPOTS)?;
             let towards = spots.towards(interaction.point, interaction.side, chances[1] > 0.0)?;
             let part = towards.part;
             Some((Aim::Spots(towards), part * share))
