@@ -44,14 +44,14 @@ def calls() -> dict[str, Call]:
     sphere = _core.Scene(compile_scene(et.Scene(**SPHERE)).record)
     scattering = {**SPHERE, "detectors": [{"name": "scatter", "kind": "scatter"}]}
     events = et.trace(et.Scene(**scattering), 4000, most_events=100).events["scatter"]
-    words = events.rows.view("<u8").reshape(len(events), -1)
+    words, brought = events.rows.view("<u8").reshape(len(events), -1), events.rows["flux"].copy()
     return {
         "map of a field": lambda: field.look(view, 2048, 1),
         "luminance of a field": lambda: [field.luminance(points, directions, 1) for _ in range(100)],
         "intensity of a field": lambda: field.intensity(directions[:20_000], 512, 1),
         "evidence of a tree": lambda: _core.polya_evidence([6, 6, 5, 5], counts, None, None, 1.0, 1),
         "posterior of a tree": lambda: _core.polya_posterior([6, 6, 5, 5], counts, None, None, 1.0, 1),
-        "map of events": lambda: [_core.look_at_events(events.core, words, view, 1) for _ in range(100)],
+        "map of events": lambda: [_core.look_at_events(events.core, words, brought, view, 1) for _ in range(100)],
         "trails": lambda: _core.trace_trails(sphere, 1000, 1, 100_000_000, 10.0),
     }
 

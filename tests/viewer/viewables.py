@@ -25,7 +25,7 @@ CARD: dict[str, Any] = {"name": "card", "kind": "illuminance", "width": 40, "hei
 def traced() -> et.TraceResult:
     disk = {"name": "disk", "kind": "rays", "shape": {"kind": "disk", "radius": 20}, "at": [0, 0, 5]}
     card = {**CARD, "at": [0, 0, 30], "toward": [0, 0, -1]}
-    return et.trace(et.Scene(sources=[LAMP], detectors=[disk, card]), rays=5000)
+    return et.trace(et.Scene(sources=[LAMP], detectors=[disk, card]), rays=20_000)
 
 
 def make_files(folder: Path) -> Path:
