@@ -550,7 +550,7 @@ def look_at_scene(
     `left`: light that is not looked for, because rays traced forwards find it. Caustics: what reaches a diffuse surface
     through smooth ones, and from there the eye directly or over other diffuse ones. Scattered: all that reaches the eye
     directly from a diffuse surface. `shared`: rays forwards for each path of a pixel, with which caustics are shared; they
-    are left out altogether without.
+    are left out altogether without. `guide`, `glints`, `spots`: where paths look for light that they meet by chance only.
     """
 
 def look_at_events(

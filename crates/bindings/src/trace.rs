@@ -214,8 +214,9 @@ type Looks<'py> = (
 
 /// Looks at a scene: for each of the passes `first..last` and each pixel, row by row, the mean luminance, the part of it that
 /// is found by chance, and the sources' own deviation \[flux unit/(mm² sr)\]; and the shares of the lines that meet a smooth
-/// surface first, and that see a diffuse one directly; and the mean luminance of light that was scattered on its way. Beside them the sum over passes and pixels of the mean weight that
-/// lines still had when they were given up, having met as many surfaces as they may, and when they were lost.
+/// surface first, and that see a diffuse one directly; and the mean luminance of light that was scattered on its way. Beside
+/// them the sum over passes and pixels of the mean weight that lines still had when they were given up, having met as many
+/// surfaces as they may, and when they were lost.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]
 #[pyo3(signature = (scene, view, paths, seed, most_events, left, first, last, threads=None, survey=None, shared=None, guide=None, glints=None, spots=None))]

@@ -181,7 +181,8 @@ def luminance(
         float | None,
         typer.Option(
             "--forward-rays",
-            help="Of a scene: rays traced forwards besides, for caustics and beams (as many as they need); 0: none.",
+            help="Of a scene: rays traced forwards besides, for caustics and beams (as many as they need); 0: none, and "
+            "no search for small bright places of walls.",
             min=0,
             show_default=False,
         ),

@@ -12,14 +12,14 @@ import numpy as np
 from etendue.cli.terminal import say
 from etendue.formats.maps import PICTURE_EXTENSIONS
 from etendue.formats.maps.map_format import AnyMap
-from etendue.luminance.filters import errors_apart, pixels_err_together
+from etendue.luminance.filters import pixels_err_together
 from etendue.luminance.region_statistics import RegionStatistics, region_statistics
 from etendue.luminance.regions import AnyRegion, parse_region
 from etendue.plot.colour_scale import Scale
 from etendue.plot.map_picture import plot_map
 from etendue.plot.region_marks import check_number
 from etendue.quantities.illuminance_map import IlluminanceMap
-from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.luminance_map import LuminanceMap, errors_parted
 from etendue.quantities.measured import measured, measured_pixel
 from etendue.quantities.observer import Screen
 from etendue.quantities.powers_of_ten import counted, rounded
@@ -125,7 +125,8 @@ def _largest_apart(lmap: LuminanceMap) -> float:
     values = lmap.values[live]
     if pixels_err_together(lmap):
         return float(values.max())
-    return unlifted(values, errors_apart(lmap)[live], np.ones(values.size)).value
+    _, own = errors_parted(values, lmap.standard_error[live], lmap.common_error)
+    return unlifted(values, own, np.ones(values.size)).value
 
 
 def _maximum(lmap: LuminanceMap) -> str:

@@ -7,8 +7,8 @@ import numpy.typing as npt
 
 from etendue.denoising.smoothing import smooth_counts
 from etendue.errors import ArgumentError
-from etendue.luminance.filters import TOGETHER, errors_apart, pixels_err_together
-from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map, notes_that_stay
+from etendue.luminance.filters import TOGETHER, pixels_err_together
+from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map, errors_parted, notes_that_stay
 
 Array = npt.NDArray[np.float64]
 
@@ -100,5 +100,6 @@ def _poisson_sums(lmap: LuminanceMap, etendue: Array) -> tuple[Array, Array]:
         )
     if not pixels_err_together(lmap):
         # What all pixels err by in common is no noise of counts.
-        errors = np.fmax(np.where(live, errors_apart(lmap), 0.0), LEAST_SHARE * errors)
+        _, own = errors_parted(values, errors, lmap.common_error)
+        errors = np.fmax(own, LEAST_SHARE * errors)
     return values * etendue, (errors * etendue) ** 2 * lit

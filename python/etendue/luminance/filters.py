@@ -14,7 +14,7 @@ import numpy.typing as npt
 from etendue.errors import ArgumentError
 from etendue.luminance.redrawn_maps import redrawn
 from etendue.quantities.arguments import require_known, require_number
-from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map, notes_that_stay
+from etendue.quantities.luminance_map import LuminanceMap, check_luminance_map, errors_parted, notes_that_stay
 from etendue.quantities.powers_of_ten import counted, rounded
 
 Array = npt.NDArray[np.float64]
@@ -152,14 +152,15 @@ def filter_map(lmap: LuminanceMap, kind: str, size: int | tuple[int, int] = 5, g
     weights = _weights(reached[0], chosen.weighted), _weights(reached[1], chosen.weighted)
     together = pixels_err_together(lmap)
     power, width = (1 if together else 2), (gamma if chosen.selective else None)
-    stack = _Stack.of(lmap, lmap.standard_error if together else errors_apart(lmap) ** 2)
+    shared, own = errors_parted(lmap.values, lmap.standard_error, lmap.common_error)
+    stack = _Stack.of(lmap, lmap.standard_error if together else own**2)
     filtered = _filter(stack, weights, width, power)
     if chosen.selective and not together:
         variance = _redrawn_variance(stack, filtered, weights, gamma, _draws(lmap))
         filtered = dataclasses.replace(filtered, error=variance)
     if lmap.common_error and not together:
-        shared = _filter(_Stack.of(lmap, errors_in_common(lmap)), weights, width, 1)
-        filtered = dataclasses.replace(filtered, error=filtered.error + shared.error**2)
+        added = _filter(_Stack.of(lmap, shared), weights, width, 1)
+        filtered = dataclasses.replace(filtered, error=filtered.error + added.error**2)
     label = f"{kind} {rows}×{columns}" + (f", γ = {gamma:g}" if chosen.selective else "")
     result = filtered.put_into(lmap, f"filter {label}", power)
     return result.replace(notes=(*notes_that_stay(lmap), *_report(lmap, result, label, chosen)))
@@ -178,37 +179,6 @@ def pixels_err_together(lmap: LuminanceMap) -> bool:
     # Rays are counted by the cone, and lines of sight are as independent; light fields count none.
     counted = lmap.rays[~np.isnan(lmap.values)] >= 0
     return not counted.any() or any(step.startswith(SMOOTHING) for step in lmap.provenance.steps)
-
-
-def errors_in_common(lmap: LuminanceMap) -> Array:
-    """What of the pixels' standard errors they have in common, `LuminanceMap.common_error`; shape of the map.
-
-    Examples
-    --------
-    >>> from etendue.quantities.observer import Observer, Screen
-    >>> lmap = LuminanceMap([[10.0, 9.0]], [[0.5, 0.1]], [[90, 90]], Observer(0, 0, 1000), Screen(2, 1, 2, 1),
-    ...                     common_error=0.03)
-    >>> errors_in_common(lmap).round(9).tolist()
-    [[0.3, 0.1]]
-    """
-    shared: Array = np.minimum(lmap.common_error * np.abs(lmap.values), lmap.standard_error)
-    return shared
-
-
-def errors_apart(lmap: LuminanceMap) -> Array:
-    """Standard errors of the pixels without what they have in common, shape of the map.
-
-    Examples
-    --------
-    >>> from etendue.quantities.observer import Observer, Screen
-    >>> lmap = LuminanceMap([[10.0]], [[0.5]], [[90]], Observer(0, 0, 1000), Screen(2, 1, 1, 1), common_error=0.03)
-    >>> errors_apart(lmap).round(9).tolist()
-    [[0.4]]
-    """
-    if not lmap.common_error:
-        return lmap.standard_error
-    apart: Array = np.sqrt(np.maximum(lmap.standard_error**2 - errors_in_common(lmap) ** 2, 0.0))
-    return apart
 
 
 def kernel(kind: str, size: int | tuple[int, int] = 5) -> Array:

@@ -180,7 +180,8 @@ class PathTracing(Method):
         if it comes from points, and that of beams. No light is counted twice. If None, a pilot finds out whether there is
         such light, and how many rays balance its error with that of the rest; 0: none, and the map's notes say that it may
         be too low. With `until` their number grows with that of the lines of sight. Not of scatter events, which are rays
-        traced forwards already.
+        traced forwards already. Unless it is 0, a few more find small bright places, as of a wall close to a lamp, at which
+        lines of sight then look.
     gather : bool, optional
         Whether lines of sight end at the second diffuse surface, whose light is then known from rays traced forwards, as a
         mean over small patches; of finishes that are not Lambertian a part of it is known, and lines go on for the rest.

@@ -14,7 +14,7 @@ from etendue.luminance.comparison import DEAD_RULES, DeadRule
 from etendue.luminance.regions import ON_THE_EDGE, AnyRegion, check_region
 from etendue.quantities.arguments import LUMINANCE_OR_ILLUMINANCE, require, require_known, require_number
 from etendue.quantities.illuminance_map import IlluminanceMap
-from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.luminance_map import LuminanceMap, errors_parted
 from etendue.quantities.observer import Screen
 from etendue.quantities.unlifted import unlifted
 
@@ -145,8 +145,7 @@ def region_statistics(
     counted = inside if dead == "zero" else live
     values, errors = (np.where(lit, array, 0.0)[counted] for array in (lmap.values, lmap.standard_error))
     common = lmap.common_error if isinstance(lmap, LuminanceMap) else 0.0
-    shared = np.minimum(common * values, errors)
-    own = np.sqrt(np.maximum(errors**2 - shared**2, 0.0))
+    shared, own = errors_parted(values, errors, common)
     mean, low, high = float(values.mean()), float(values.min()), float(values.max())
     return RegionStatistics(
         mean=mean,

@@ -137,6 +137,33 @@ def dead_note(dead: npt.NDArray[np.bool_]) -> str:
     return f"{int(dead.sum()):,} of {dead.size:,}{DEAD}"
 
 
+def errors_parted(values: MapValues, errors: MapValues, common: float) -> tuple[MapValues, MapValues]:
+    """What of the standard errors of pixels they have in common, and the rest, so that the squares of both add up.
+
+    Parameters
+    ----------
+    values, errors : array, of one shape
+        Of pixels, or terms of a sum over them, in one unit; NaN where unknown.
+    common : float
+        `LuminanceMap.common_error`. No pixel has more of it than its own error.
+
+    Returns
+    -------
+    shared, own : array
+        In that shape and unit.
+
+    Examples
+    --------
+    >>> shared, own = errors_parted(np.array([10.0, 9.0]), np.array([0.5, 0.1]), 0.03)
+    >>> shared.round(9).tolist(), own.round(9).tolist()
+    ([0.3, 0.1], [0.4, 0.0])
+    """
+    if not common:
+        return np.zeros_like(errors), errors
+    shared = np.minimum(common * np.abs(values), errors)
+    return shared, np.sqrt(np.maximum(errors**2 - shared**2, 0.0))
+
+
 def notes_that_stay(lmap: LuminanceMap) -> tuple[str, ...]:
     """The notes of a map that are true of it smoothed: how many pixels were dead is not.
 

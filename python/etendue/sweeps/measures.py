@@ -14,7 +14,7 @@ from etendue.errors import ArgumentError, UnknownNameError
 from etendue.luminance.regions import AnyRegion
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.intensity import Intensity
-from etendue.quantities.luminance_map import LuminanceMap
+from etendue.quantities.luminance_map import LuminanceMap, errors_parted
 from etendue.quantities.ray_set import RaySet
 from etendue.scene import Scene
 from etendue.scene.detectors.detector import Counted
@@ -494,5 +494,5 @@ def _sum_error(step: Step, found: LuminanceMap, terms: Array, errors: Array) -> 
     known = np.nan_to_num(errors)
     if any(isinstance(source, Rays | Field | Gridded) for source in step.scene.sources):
         return float(known.sum())
-    shared = np.minimum(found.common_error * np.abs(np.nan_to_num(terms)), known)
-    return math.hypot(math.sqrt(float((known**2 - shared**2).sum())), float(shared.sum()))
+    shared, own = errors_parted(np.nan_to_num(terms), known, found.common_error)
+    return math.hypot(math.sqrt(float((own**2).sum())), float(shared.sum()))
