@@ -155,8 +155,8 @@ def print_illuminance(found: IlluminanceMap, regions: Sequence[AnyRegion] = ()) 
     x, y, z = found.centre
     say(f"{found.quantity} around ({x:g}, {y:g}, {z:g}) mm")
     say(
-        f"  mean {counted(found.mean, found.unit)}, least/mean {rounded(found.uniformity, 3)}, "
-        f"flux {counted(found.flux, found.flux_unit)}"
+        f"  mean {measured(found.mean, found.mean_error, found.unit)}, least/mean {rounded(found.uniformity, 3)}, "
+        f"flux {measured(found.flux, found.flux_error, found.flux_unit)}"
     )
     if found.relative_error is not None:
         say(f"  {found.relative_error.sentence(found.quantity)}")
@@ -178,8 +178,10 @@ def describe_map(found: AnyMap) -> dict[str, Any]:
         "centre": list(found.centre),
         "normal": list(found.normal),
         "mean": found.mean,
+        "mean_error": found.mean_error,
         "uniformity": found.uniformity if found.mean > 0.0 else None,
         "flux": found.flux,
+        "flux_error": found.flux_error,
         "relative_error": None if error is None else dataclasses.asdict(error),
         "pixels": found.values.size,
         "notes": list(found.notes),

@@ -22,6 +22,7 @@ from etendue.formats.intensity.eulumdat_writer import require_luminous
 from etendue.formats.maps import MAP_EXTENSIONS, PICTURE_EXTENSIONS
 from etendue.formats.rays import RAY_FORMATS, write_rays
 from etendue.plot.intensity_picture import plot_intensity
+from etendue.quantities.measured import measured
 from etendue.scene import Scene
 from etendue.tracing.plan import Plan
 from etendue.tracing.result import TraceResult
@@ -243,7 +244,10 @@ def print_result(result: TraceResult) -> None:
     for line in result.ledger.table().splitlines():
         say(f"  {line}")
     for detection in result.plan.detections:
-        say(f"  {detection.name}: {detection.summary(result.quantity_of(detection.name))}")
+        told = detection.summary(result.quantity_of(detection.name))
+        if detection.HAS_WHOLE:
+            told = f"flux {measured(*result.flux_of(detection.name), result.plan.flux_unit)}, {told}"
+        say(f"  {detection.name}: {told}")
         for note in result.notes_of(detection.name):
             say(f"    {note}")
     for note in result.notes:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.quantities.arguments import as_point
+from etendue.quantities.arguments import as_point, require_number
 from etendue.quantities.observer import Screen
 from etendue.quantities.pixel_map import MapValues, PixelMap
 from etendue.quantities.provenance import Provenance
@@ -44,6 +45,9 @@ class IlluminanceMap(PixelMap):
     provenance : Provenance
     notes : tuple of str
         What the user should know.
+    flux_error : float
+        Standard error of the flux of all cells [`flux_unit`]; NaN where unknown. A ray may come to several cells, by the
+        walls of a room, and what it brings to them is not independent: errors of the cells do not tell it.
 
     Raises
     ------
@@ -71,6 +75,7 @@ class IlluminanceMap(PixelMap):
     flux_unit: FluxUnit = "lm"
     provenance: Provenance = dataclasses.field(default_factory=Provenance)
     notes: tuple[str, ...] = ()
+    flux_error: float = math.nan
 
     UNITS: ClassVar = ILLUMINANCE_UNIT
     QUANTITIES: ClassVar = ILLUMINANCE_NAME
@@ -82,6 +87,7 @@ class IlluminanceMap(PixelMap):
             object.__setattr__(
                 self, name, as_point(getattr(self, name), f"IlluminanceMap: {name}", "three finite numbers")
             )
+        require_number(self.flux_error, "IlluminanceMap: flux_error", "a standard error, or leave it out")
         axes = np.array([self.right, self.up])
         if np.abs(axes @ axes.T - np.eye(2)).max() > ROUNDING:
             raise ArgumentError(f"IlluminanceMap: {self.right} and {self.up} are no unit vectors at right angles.")
@@ -116,14 +122,27 @@ class IlluminanceMap(PixelMap):
         return float(self.values.mean())
 
     @property
+    def mean_error(self) -> float:
+        """Standard error of the mean illuminance [`unit`]; NaN where unknown."""
+        return self.flux_error * MM2_PER_M2 / (self.screen.pixel_area * self.values.size)
+
+    @property
     def uniformity(self) -> float:
         """Least over mean illuminance of the cells (U₀ of the trade); NaN if it is dark."""
         return float(self.values.min()) / self.mean if self.mean > 0.0 else float("nan")
 
     def _geometry(self) -> dict[str, Any]:
         axes = {name: list(getattr(self, name)) for name in ("centre", "right", "up")}
-        return {"screen": dataclasses.asdict(self.screen), **axes}
+        flux_error = None if math.isnan(self.flux_error) else self.flux_error
+        return {"screen": dataclasses.asdict(self.screen), **axes, "flux_error": flux_error}
 
     @classmethod
     def _geometry_from(cls, header: dict[str, Any]) -> dict[str, Any]:
-        return {"screen": Screen(**header["screen"]), **{name: header[name] for name in ("centre", "right", "up")}}
+        # Files of earlier versions do not say it.
+        flux_error = header.get("flux_error")
+        axes = {name: header[name] for name in ("centre", "right", "up")}
+        return {
+            "screen": Screen(**header["screen"]),
+            **axes,
+            "flux_error": math.nan if flux_error is None else flux_error,
+        }

@@ -15,10 +15,7 @@ from etendue.luminance.regions import AnyRegion
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminance_map import LuminanceMap, errors_parted
-from etendue.quantities.ray_set import RaySet
 from etendue.scene import Scene
-from etendue.scene.detectors.detector import Counted
-from etendue.scene.detectors.illuminance import Illuminance
 from etendue.scene.sources.from_files import Field, Rays
 from etendue.scene.sources.gridded import Gridded
 from etendue.tracing.result import TraceResult
@@ -59,8 +56,6 @@ class Step:
         Luminance maps by the name of the observer.
     region : Region, PolygonRegion or None
         What of these maps counts.
-    whole : mapping of str to str
-        By the name of an illuminance detector that of another one in its place, of one cell: see `with_whole`.
 
     Examples
     --------
@@ -74,7 +69,6 @@ class Step:
     result: TraceResult | None
     maps: Mapping[str, LuminanceMap]
     region: AnyRegion | None = None
-    whole: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     @property
     def traced(self) -> TraceResult:
@@ -357,14 +351,7 @@ def _whole(noun: str, of: str) -> None:
 
 @_noun("flux", "flux on a detector, or in a far field", "detector")
 def _flux_of(step: Step, of: str) -> Found:
-    found, result = step.traced.quantity_of(of), step.traced
-    if isinstance(found, Intensity):
-        return Found(found.flux, found.flux_error, found.flux_unit)
-    if isinstance(found, IlluminanceMap):
-        return Found(found.flux, _cells_error(found, step, of), found.flux_unit)
-    if isinstance(found, RaySet):
-        return _flux(found.total_flux, result)
-    raise ArgumentError(f"flux:{of}: name a detector of rays, illuminance or intensity.")
+    return Found(*step.traced.flux_of(of), step.traced.plan.flux_unit)
 
 
 @_noun("peak", "peak intensity of a far field", "detector")
@@ -373,57 +360,6 @@ def _peak(step: Step, of: str) -> Found:
     if not isinstance(found, Intensity):
         raise ArgumentError(f"peak:{of}: name a detector of the kind intensity.")
     return Found(found.peak_intensity, found.peak_error, found.unit)
-
-
-def _cells_error(found: IlluminanceMap, step: Step, of: str) -> float:
-    """Standard error of the flux [flux unit] on a detector.
-
-    What a ray brings to all cells together counts as one contribution, however often it comes: the detector of one cell in
-    the same place has the sum of its squares. Where there is none, a ray is taken to meet one of the cells, once, or none;
-    NaN if more flux meets the cells than there is, so that rays did so several times.
-    """
-    result = step.traced
-    number = [detection.name for detection in result.plan.detections].index(step.whole.get(of, of))
-    sum_, *others = result.sums.cells[number]
-    if sum_.shape[1] > 1 and found.flux > result.ledger.total.flux * (1.0 + ROUNDING):
-        return math.nan
-    sum_, squares, count, products = (row.sum(axis=1, keepdims=True) for row in (sum_, *others))
-    one = sum_, squares, count, products
-    return float(Counted.of(one, result.plan.dealing, result.rays_done, result.sums.sources).error[0])
-
-
-def with_whole(scene: Scene, measures: Iterable[Measure]) -> tuple[Scene, dict[str, str]]:
-    """A scene in which each illuminance detector that is measured has another one in its place, of one cell.
-
-    A ray may come to several cells, by the walls of a room, and what it brings to them is not independent. The sum of the
-    squares of what each ray brings in all is known where all cells are one.
-
-    Returns
-    -------
-    scene : Scene
-        As it was if no such detector is measured; detectors change nothing of the light.
-    whole : dict
-        The name of that detector by the name of the one that is measured.
-
-    Examples
-    --------
-    >>> desk = {"name": "desk", "kind": "illuminance", "width": 10, "height": 10, "columns": 4, "rows": 4}
-    >>> scene, whole = with_whole(Scene(detectors=[desk]), measures_of(["flux:desk"], ["desk"], []))
-    >>> whole, [detector.columns for detector in scene.detectors]
-    ({'desk': 'desk as one cell'}, [4, 1])
-    """
-    wanted = {measure.of for measure in measures if measure.reads in ("detector", "map")}
-    taken = {detector.name for detector in scene.detectors}
-    whole: dict[str, str] = {}
-    more = []
-    for i, detector in enumerate(scene.detectors):
-        name = detector.name or f"detectors[{i}]"
-        if name in wanted and isinstance(detector, Illuminance) and detector.columns * detector.rows > 1:
-            whole[name] = f"{name} as one cell"
-            while whole[name] in taken:
-                whole[name] += " of its own"
-            more.append(detector.replace(name=whole[name], columns=1, rows=1))
-    return (scene.replace(detectors=[*scene.detectors, *more]) if more else scene), whole
 
 
 # --- maps --------------------------------------------------------------------------------------------------------------
@@ -435,8 +371,7 @@ def _mean(step: Step, of: str) -> Found:
     value = float(np.nan_to_num(found.values[inside]).mean())
     if isinstance(found, IlluminanceMap):
         # A region is of observers' maps: all cells count.
-        area = found.screen.pixel_area / MM2_PER_M2 * found.values.size
-        return Found(value, _cells_error(found, step, of) / area, found.unit)
+        return Found(value, found.mean_error, found.unit)
     values, errors = (array[inside] / int(inside.sum()) for array in (found.values, found.standard_error))
     return Found(value, _sum_error(step, found, values, errors), found.unit)
 

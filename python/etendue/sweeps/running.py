@@ -20,7 +20,7 @@ from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import Progress, checked_threads
 from etendue.scene import Scene, compile_scene
-from etendue.sweeps.measures import Found, Measure, Step, measures_of, with_whole
+from etendue.sweeps.measures import Found, Measure, Step, measures_of
 from etendue.sweeps.parameter import MOST_STEPS, Parameter
 from etendue.sweeps.table import SweepTable
 from etendue.tracing.result import TraceResult
@@ -258,11 +258,9 @@ class Steps(Iterator[SweepTable]):
     def _step(self, scene: Scene) -> tuple[Step, list[str]]:
         result: TraceResult | None = None
         notes: list[str] = []
-        whole: dict[str, str] = {}
         seen = [m for m in self._measures if m.of in self._looked.names and m.reads in ("map", "observer")]
         if len(seen) < len(self._measures):
-            traced, whole = with_whole(scene, self._measures)
-            *_, result = trace_rounds(traced, self._rays, self._how.seed, threads=self._threads)
+            *_, result = trace_rounds(scene, self._rays, self._how.seed, threads=self._threads)
             notes += result.notes
             for name in dict.fromkeys(m.of for m in self._measures if m.reads == "map" and m not in seen):
                 notes += result.notes_of(name)
@@ -279,7 +277,7 @@ class Steps(Iterator[SweepTable]):
             maps = dict(zip(wanted, found, strict=True))
             for lmap in found:
                 notes += [note for note in lmap.notes if note not in notes]
-        return Step(scene, result, maps, self._region, whole), notes
+        return Step(scene, result, maps, self._region), notes
 
     def _table(self) -> SweepTable:
         shape = tuple(len(values) for values in self._axes.values())

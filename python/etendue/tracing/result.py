@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from functools import cached_property
 from typing import Any, TypeVar
 
+from etendue.errors import ArgumentError
 from etendue.formats.input import as_path
 from etendue.quantities.illuminance_map import IlluminanceMap
 from etendue.quantities.intensity import Intensity
@@ -182,9 +183,40 @@ class TraceResult(InNotebook):
         """
         number = self._numbers[detector]
         if number not in self._quantities:
-            recorded = DetectorSums(self.plan, self.sums, number, self._origin)
-            self._quantities[number] = self.plan.detections[number].read(recorded)
+            self._quantities[number] = self.plan.detections[number].read(self._recorded(number))
         return self._quantities[number]
+
+    def _recorded(self, number: int) -> DetectorSums:
+        if number not in self._read_from:
+            self._read_from[number] = DetectorSums(self.plan, self.sums, number, self._origin)
+        return self._read_from[number]
+
+    def flux_of(self, detector: str) -> tuple[float, float]:
+        """Flux of all light that a detector met, and its standard error [flux unit].
+
+        A ray that comes to it again and again counts as one contribution. The error is NaN if no ray came.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such detector; suggests the nearest.
+        ArgumentError
+            If it sums no flux: it is neither of rays, nor of illuminance, nor of intensity.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> lid = {"name": "lid", "kind": "rays", "shape": {"kind": "rectangle", "width": 2, "height": 2}, "at": [0, 0, 1]}
+        >>> scene = et.Scene(sources=[{"kind": "point", "flux": 60}], detectors=[lid])
+        >>> flux, error = et.trace(scene, rays=10_000).flux_of("lid")          # a sixth: one face of a cube
+        >>> bool(abs(flux - 10) < 3 * error), round(error, 2)                  # 60 lm · √(1/6 · 5/6/10 000)
+        (True, 0.22)
+        """
+        number = self._numbers[detector]
+        if not self.plan.detections[number].HAS_WHOLE:
+            raise ArgumentError(f"flux:{detector}: name a detector of rays, illuminance or intensity.")
+        counted = self._recorded(number).counted
+        return float(counted.flux[-1]), float(counted.error[-1])
 
     @cached_property
     def rays(self) -> ByName[RaySet]:
@@ -220,6 +252,11 @@ class TraceResult(InNotebook):
         """What was read so far, by the number of the detector."""
         return {}
 
+    @cached_property
+    def _read_from(self) -> dict[int, DetectorSums]:
+        """What it was read from."""
+        return {}
+
     def _all(self, kind: type[Detection[T]], called: str) -> ByName[T]:
         names = [detection.name for detection in self.plan.detections if isinstance(detection, kind)]
         return ByName(called, {name: self.quantity_of(name) for name in names})
@@ -232,8 +269,15 @@ class TraceResult(InNotebook):
         """
         pairs = zip(self.plan.detections, self.sums.cells, strict=True)
         dealing, sources, rays = self.plan.dealing, self.sums.sources, self.rays_done
-        errors = [d.relative_error(d.counted(cells, sources, dealing, rays)) for d, cells in pairs if d.cells]
+        errors = [d.relative_error(d.counted(cells, sources, dealing, rays)) for d, cells in pairs if d.judged]
         return max(errors) if errors and all(error == error for error in errors) else float("nan")  # noqa: PLR0124
+
+    def _flux_of(self, detection: Detection[Any]) -> dict[str, Any]:
+        """The flux of all light that it met, as plain data for JSON."""
+        if not detection.HAS_WHOLE:
+            return {}
+        flux, error = self.flux_of(detection.name)
+        return {"flux": flux, "flux_error": error, "flux_unit": self.plan.flux_unit}
 
     def notes_of(self, detector: str) -> tuple[str, ...]:
         """What there is to say of what a detector saw, beside the `notes` of the whole trace."""
@@ -297,6 +341,7 @@ class TraceResult(InNotebook):
             "ledger": self.ledger.to_dict(),
             "detectors": [
                 {"name": d.name, "kind": d.KIND, "notes": list(self.notes_of(d.name))}
+                | self._flux_of(d)
                 | d.figures(self.quantity_of(d.name))
                 for d in self.plan.detections
             ],

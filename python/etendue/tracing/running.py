@@ -148,7 +148,7 @@ def trace_rounds(
     work = trace_work(scene, rays, seed, most_events=most_events, threads=threads, before=before)
     if before is not None:
         work.plan.check_same(before)
-    if until is not None and not any(detection.cells for detection in work.plan.detections):
+    if until is not None and not any(detection.judged for detection in work.plan.detections):
         raise ArgumentError("until: the scene has no detector with cells (intensity, illuminance, image) to judge by.")
     return Rounds(work, start, until, threads)
 

@@ -33,9 +33,10 @@ from etendue.tracing.scattered import STRETCH, Scattered
 from etendue.tracing.sums import ENTRIES, RECORD, Collected, Sums
 from etendue.units import FLUX_UNITS
 
-VERSION = 4
-"""What errors of unequal rays rest on is held since version 4, far fields are shared by nodes since version 3, and copies of
-rays are counted together since version 2."""
+VERSION = 5
+"""Illuminance meters and ray collecting surfaces have a cell of all light since version 5, what errors of unequal rays rest
+on is held since version 4, far fields are shared by nodes since version 3, and copies of rays are counted together since
+version 2."""
 
 CHUNK = 1 << 13
 """Rows of a chunk of rays: half a megabyte."""

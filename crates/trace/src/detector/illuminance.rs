@@ -7,7 +7,8 @@ use etendue_math::{Frame, Vec3};
 use super::kind::{Kind, Light, Recorded};
 use super::record::{Described, Record};
 
-/// A rectangle in the plane z = 0 of its frame: flux that arrives on its front, by cells.
+/// A rectangle in the plane z = 0 of its frame: flux that arrives on its front, by cells; behind them a cell for all of it,
+/// as a ray may come to several cells, and what it brings to them is not independent.
 #[derive(Clone, Debug)]
 pub struct Illuminance {
     /// Its centre and axes.
@@ -52,13 +53,16 @@ impl Kind for Illuminance {
     }
 
     fn cells(&self) -> usize {
-        self.columns as usize * self.rows as usize
+        self.columns as usize * self.rows as usize + 1
     }
 
     fn passing(&self, light: &Light<'_>, point: Vec3, out: &mut Recorded) {
         let (size, cells) = ([self.width, self.height], [self.columns, self.rows]);
         if let Some(cell) = illuminance_cell(&self.frame, size, cells, point, light.direction) {
-            out.contribute(cell, light.state, light.state.flux);
+            // No tally has more cells than can be counted.
+            for cell in [cell, self.columns.saturating_mul(self.rows)] {
+                out.contribute(cell, light.state, light.state.flux);
+            }
         }
     }
 }

@@ -6,7 +6,7 @@ use etendue_math::Vec3;
 use super::kind::{Kind, Light, Recorded};
 use super::record::{Described, Record};
 
-/// Keeps every ray that passes its face, from either side.
+/// Keeps every ray that passes its face, from either side; a cell holds what each brings in all, however often it passes.
 #[derive(Clone, Debug)]
 pub struct Rays(pub Face);
 
@@ -21,7 +21,12 @@ impl Kind for Rays {
         Some(self.0.clone())
     }
 
+    fn cells(&self) -> usize {
+        1
+    }
+
     fn passing(&self, light: &Light<'_>, point: Vec3, out: &mut Recorded) {
         out.rays.push(light.at(point));
+        out.contribute(0, light.state, light.state.flux);
     }
 }

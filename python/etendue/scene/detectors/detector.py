@@ -133,6 +133,10 @@ class Detection(abc.ABC, Generic[Q]):
     HAS_FACE: ClassVar[bool] = False
     """Whether light passes a face of it."""
 
+    HAS_WHOLE: ClassVar[bool] = False
+    """Whether its last cell is of all light together: a ray may come to several cells, or again and again, and what it
+    brings to them is not independent."""
+
     name: str
 
     @property
@@ -149,9 +153,15 @@ class Detection(abc.ABC, Generic[Q]):
         """Its cells, from sums over the first `rays` rays of a run; `sources` are those of what sources emitted."""
         return Counted.of(cells, dealing, rays, sources)
 
+    @property
+    def judged(self) -> int:
+        """Number of cells that tell how well light is known: the first ones, without that of all light."""
+        return self.cells - self.HAS_WHOLE
+
     def relative_error(self, counted: Counted) -> float:
-        """Median over the flux of the relative standard errors of its cells; NaN if no ray reached any."""
-        return counted.relative_error
+        """Median over the flux of the relative standard errors of these cells; NaN if no ray reached any."""
+        own = slice(self.judged)
+        return Counted(counted.flux[own], counted.error[own], counted.rays[own]).relative_error
 
     @abc.abstractmethod
     def read(self, recorded: Recorded) -> Q:
@@ -159,10 +169,10 @@ class Detection(abc.ABC, Generic[Q]):
 
     @abc.abstractmethod
     def summary(self, quantity: Q) -> str:
-        """The quantity in a line."""
+        """The quantity in a line, without the flux of all light, if there is a cell of it."""
 
     def figures(self, quantity: Q) -> dict[str, Any]:  # noqa: ARG002 - not every quantity has figures
-        """The quantity in figures, as plain data for JSON."""
+        """The quantity in figures without that flux, as plain data for JSON."""
         return {}
 
     def to_dict(self) -> dict[str, Any]:

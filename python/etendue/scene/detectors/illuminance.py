@@ -14,8 +14,9 @@ import numpy.typing as npt
 from etendue.description.files import Files
 from etendue.description.values import Length, Pixels
 from etendue.quantities.illuminance_map import IlluminanceMap, Point
+from etendue.quantities.measured import measured
 from etendue.quantities.observer import Screen
-from etendue.quantities.powers_of_ten import counted, rounded
+from etendue.quantities.powers_of_ten import rounded
 from etendue.scene.detectors.detector import Counted, Detection, Detector, Record, Recorded, Setting, brightest_of
 from etendue.scene.observers import ObserverKeys
 from etendue.scene.placement import Placement
@@ -41,6 +42,7 @@ class GridIlluminance(Detection[IlluminanceMap]):
 
     KIND = "illuminance"
     HAS_FACE = True
+    HAS_WHOLE = True
     width: float
     height: float
     columns: int
@@ -51,14 +53,16 @@ class GridIlluminance(Detection[IlluminanceMap]):
 
     @property
     def cells(self) -> int:
-        """Number of cells that flux is summed in."""
-        return self.columns * self.rows
+        """Number of cells that flux is summed in: those of the grid, and the last one for all of them."""
+        return self.columns * self.rows + 1
 
     def read(self, recorded: Recorded) -> IlluminanceMap:
         """Flux of each cell over its area."""
         counted, origin = recorded.counted, recorded.origin
         screen = Screen(self.width, self.height, self.columns, self.rows, "xy")
         area = screen.pixel_area / MM2_PER_M2
+        flux_error = float(counted.error[-1])
+        counted = Counted(counted.flux[:-1], counted.error[:-1], counted.rays[:-1])
         return IlluminanceMap(
             counted.flux.reshape(screen.shape) / area,
             counted.error.reshape(screen.shape) / area,
@@ -70,15 +74,18 @@ class GridIlluminance(Detection[IlluminanceMap]):
             origin.flux_unit,
             origin.provenance.then(f"illuminance on {self.name!r}"),
             (*origin.notes, *_chance_told(counted)),
+            flux_error,
         )
 
     def summary(self, quantity: IlluminanceMap) -> str:
         """Mean and uniformity."""
-        return f"mean {counted(quantity.mean, quantity.unit)}, least/mean {rounded(quantity.uniformity, 3)}"
+        mean = measured(quantity.mean, quantity.mean_error, quantity.unit)
+        return f"mean {mean}, least/mean {rounded(quantity.uniformity, 3)}"
 
     def figures(self, quantity: IlluminanceMap) -> dict[str, Any]:
         """Mean and uniformity, the brightest cell, and how many there are."""
-        return {"mean": quantity.mean, "uniformity": quantity.uniformity, **brightest_of(quantity)}
+        mean = {"mean": quantity.mean, "mean_error": quantity.mean_error, "uniformity": quantity.uniformity}
+        return mean | brightest_of(quantity)
 
 
 def lowered_by_chance(values: Array, errors: Array) -> float:

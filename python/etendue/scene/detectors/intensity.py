@@ -14,8 +14,8 @@ from etendue.description.files import Files
 from etendue.description.values import AsNumber, Finite, Pixels
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.intensity_nodes import Nodes
-from etendue.quantities.measured import measured, peak_line
-from etendue.scene.detectors.detector import Counted, Detection, Detector, Record, Recorded, Setting
+from etendue.quantities.measured import peak_line
+from etendue.scene.detectors.detector import Detection, Detector, Record, Recorded, Setting
 from etendue.scene.observers import ObserverKeys
 
 MOST_STEPS = 18_000
@@ -35,6 +35,7 @@ class FarFieldIntensity(Detection[Intensity]):
     """
 
     KIND = "intensity"
+    HAS_WHOLE = True
     nodes: Nodes
     told: tuple[str, ...] = ()
 
@@ -48,10 +49,6 @@ class FarFieldIntensity(Detection[Intensity]):
         """Number of cells that flux is summed in: one for each node, and the last one for all rays together."""
         return len(self.nodes)
 
-    def relative_error(self, counted: Counted) -> float:
-        """As of the nodes."""
-        return Counted(counted.flux[:-1], counted.error[:-1], counted.rays[:-1]).relative_error
-
     def read(self, recorded: Recorded) -> Intensity:
         """Shares of each node over the solid angle of its hat."""
         counted, origin = recorded.counted, recorded.origin
@@ -60,16 +57,13 @@ class FarFieldIntensity(Detection[Intensity]):
         return self.nodes.intensity(counted.flux, counted.error, origin.flux_unit, provenance, notes)
 
     def summary(self, quantity: Intensity) -> str:
-        """Flux and peak."""
-        return f"flux {measured(quantity.flux, quantity.flux_error, quantity.flux_unit)}, {peak_line(quantity)}"
+        """The peak."""
+        return peak_line(quantity)
 
     def figures(self, quantity: Intensity) -> dict[str, Any]:
-        """Flux, peak, and how fine the table is."""
+        """The peak, and how fine the table is."""
         c, gamma = quantity.peak
         return {
-            "flux": quantity.flux,
-            "flux_error": quantity.flux_error,
-            "flux_unit": quantity.flux_unit,
             "maximum": quantity.maximum,
             "maximum_error": quantity.maximum_error,
             "peak_intensity": quantity.peak_intensity,

@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal
 
 from etendue.description.families import Family
 from etendue.description.files import Files
-from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.ray_set import RaySet
 from etendue.scene.detectors.detector import Detection, Detector, Record, Recorded, Setting
@@ -24,6 +23,12 @@ class IncidentRays(Detection[RaySet]):
 
     KIND = "rays"
     HAS_FACE = True
+    HAS_WHOLE = True
+
+    @property
+    def cells(self) -> int:
+        """One, for all rays together."""
+        return 1
 
     def read(self, recorded: Recorded) -> RaySet:
         """The rays, with a wavelength each unless all have the same."""
@@ -43,12 +48,12 @@ class IncidentRays(Detection[RaySet]):
         return RaySet.from_records(records, meaning)
 
     def summary(self, quantity: RaySet) -> str:
-        """Number and flux."""
-        return f"{len(quantity):,} rays, {counted(quantity.total_flux, quantity.flux_unit)}"
+        """How many there are."""
+        return f"{len(quantity):,} rays"
 
     def figures(self, quantity: RaySet) -> dict[str, Any]:
-        """How many there are, and their flux."""
-        return {"rays": len(quantity), "flux": quantity.total_flux, "flux_unit": quantity.flux_unit}
+        """How many there are."""
+        return {"rays": len(quantity)}
 
 
 class RayCollector(Detector, Placement):
