@@ -116,6 +116,26 @@ class Step:
         bound = self.add(f"FACE_BOUND('',{loop},.T.)")
         return [self.add(f"ADVANCED_FACE('',({bound}),{surface},.T.)")]
 
+    def spline_ball(self, radius: float) -> list[str]:
+        """The same as one face of a rational B-spline, as programs write it that know no spheres: a half circle, turned."""
+        turn = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0)]
+        half = [(0, -1), (1, -1), (1, 0), (1, 1), (0, 1)]
+        rows = [[self.point(radius * r * x, radius * r * y, radius * z) for r, z in half] for x, y in turn]
+        weights = [[0.5 ** ((i % 2 + j % 2) / 2) for j in range(5)] for i in range(9)]
+        net, shares = (
+            ",".join(f"({','.join(row)})" for row in table)
+            for table in (rows, [[f"{weight:.15f}" for weight in row] for row in weights])
+        )
+        surface = self.add(
+            f"(BOUNDED_SURFACE()B_SPLINE_SURFACE(2,2,({net}),.UNSPECIFIED.,.F.,.F.,.F.)"
+            "B_SPLINE_SURFACE_WITH_KNOTS((3,2,2,2,3),(3,2,3),(0.,1.,2.,3.,4.),(0.,1.,2.),.UNSPECIFIED.)"
+            f"GEOMETRIC_REPRESENTATION_ITEM()RATIONAL_B_SPLINE_SURFACE(({shares}))REPRESENTATION_ITEM('')SURFACE())"
+        )
+        vertex = self.add(f"VERTEX_POINT('',{self.point(0.0, 0.0, -radius)})")
+        loop = self.add(f"VERTEX_LOOP('',{vertex})")
+        bound = self.add(f"FACE_BOUND('',{loop},.T.)")
+        return [self.add(f"ADVANCED_FACE('',({bound}),{surface},.T.)")]
+
     def polyhedron(self, corners: Any, faces: list[tuple[int, ...]]) -> list[str]:
         """Plane faces, counter-clockwise seen from outside."""
         corners = np.asarray(corners, dtype=float)
@@ -227,6 +247,14 @@ def hollow(side: float, *, hole: float) -> str:
     step.part(
         [step.solid(step.polyhedron(side * CUBE, CUBE_FACES), hole=inside)], product="hollow", context=step.context()
     )
+    return step.text()
+
+
+def hollow_ball(radius: float, *, hole: float) -> str:
+    """A ball with a void in its middle, both of splines."""
+    step = Step()
+    solid = step.solid(step.spline_ball(radius), hole=step.spline_ball(hole))
+    step.part([solid], product="bubble", context=step.context())
     return step.text()
 
 

@@ -13,6 +13,7 @@ from etendue.errors import SceneError
 from etendue.quantities.luminance_map import LuminanceMap
 from etendue.scene import Scene, compile_scene
 from etendue.scene.mesh_files import read_mesh, step_bodies
+from etendue.scene.step_files import read_step
 from oracles import step
 from oracles.meshes import smooth_mesh
 
@@ -100,6 +101,19 @@ def test_a_void_belongs_to_the_body_around_it(tmp_path: Path) -> None:
     (body,) = bodies
     assert (body.name, body.closed) == ("hollow", True)
     assert body.volume == pytest.approx(64.0 - 8.0, rel=1e-5)
+
+
+def test_faces_of_splines_smaller_than_any_look_are_seen(tmp_path: Path) -> None:
+    """A ball with a void, both of rational splines: 4/3 π (10³ − 6³) mm³, to within the chords' share of both surfaces.
+
+    The tolerance for a whole file leaves two flat triangles of each, and with them no void.
+    """
+    for tolerance in (0.2, 1e6):
+        (body,) = read_step(tmp_path, step.hollow_ball(10.0, hole=6.0).encode(), tolerance)
+        assert (body.name, body.closed) == ("bubble", True)
+        most = 4.0 * np.pi * (10.0**2 + 6.0**2) * body.chord_error
+        assert 0.0 < body.chord_error < 2.0 * min(tolerance, 1.2)
+        assert body.volume == pytest.approx(4.0 / 3.0 * np.pi * (10.0**3 - 6.0**3), abs=most)
 
 
 @pytest.mark.parametrize("height", [0.2, -0.1])

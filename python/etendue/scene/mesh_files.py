@@ -21,6 +21,7 @@ from etendue.scene.mesh_limits import LARGEST_FILE, check_mesh, require_mesh_mem
 from etendue.scene.obj_files import read_obj
 from etendue.scene.stated_normals import states_normals
 from etendue.scene.step_files import StepBody, read_step
+from etendue.scene.triangles import as_written
 from etendue.units import MM_PER_LENGTH_UNIT
 
 Array = npt.NDArray[np.float64]
@@ -164,7 +165,8 @@ def read_mesh(path: Path, unit: str | None, tolerance: float | None = None, body
     else:
         vertices, triangles = read_obj(path, raw) if form.name == "obj" else _load(path, form, raw)
         mm = MM_PER_LENGTH_UNIT[unit] if unit is not None else form.mm or 1.0
-        mesh = StoredMesh(vertices * mm, triangles, unread_normals=states_normals(form.name, raw))
+        # In the file's own unit, in which somebody wrote them.
+        mesh = StoredMesh(as_written(vertices) * mm, triangles, unread_normals=states_normals(form.name, raw))
     require_mesh_memory(path, len(mesh.triangles))
     if not len(mesh.triangles):
         raise FormatError(path, "whole file", "there are no triangles", "Export the body as a triangle mesh.")

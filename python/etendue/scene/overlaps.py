@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +33,18 @@ SHARE = 0.01
 BESIDE = 1e-6
 """Of the size of a solid: what overlaps by less was meant to touch. It is far more than the roundings of a placement, and
 of coordinates in single precision, and less than anything that is made."""
+
+ROUNDING = 1e-12
+"""Of the size of a solid: faces that are nearer to each other may be one to the tracer, and are not told."""
+
+FEWEST_FILMS, FILMS = 3, 0.01
+"""Lines that meet a film between two solids before it is told, and, of solids that overlap, their share of the lines that go
+from one to the other: near an edge a few do by chance."""
+
+THIN, VARIED = 5e-3, 0.4
+"""Triangles that stand for the same curved surface are nearer to each other than this part of the size of a solid (ten times
+the distance from it that is asked for by default), and here and there much nearer than on the whole: the least twentieth of
+the lines than this part of the median. Across an even gap it is half of that."""
 
 MOST_PAIRS = 512
 """Pairs of solids with boxes that meet; a scene with more is looked at in part."""
@@ -71,8 +83,9 @@ def doubts_about(record: Record, kinds: Sequence[Kind], source_names: Sequence[s
     """What is probably not meant: each with the names of both bodies and a point.
 
     Solids may lie in one another and touch. These are told: two of which each has space of its own and both share some;
-    one that lies in a later one, which fills its space; more than four in one place; sources of which a part starts in a
-    solid and a part does not, or which start in a solid that no light leaves.
+    one that lies in a later one, which fills its space; more than four in one place; two that touch but for a film that
+    nobody makes; sources of which a part starts in a solid and a part does not, or which start in a solid that no light
+    leaves.
 
     The lines are the same every time. What takes less than some thousandth of the box that two solids share may be missed.
 
@@ -213,39 +226,83 @@ def _directions(n: int) -> Array:
 
 def _overlaps(solids: _Solids) -> Iterator[str]:
     pairs = list(itertools.islice(_near(solids), MOST_PAIRS + 1))
-    lines = min(MOST_LINES, max(FEWEST_LINES, ALL_LINES // max(1, 2 * len(pairs))))
+    lines = _lines_for(pairs)
     names = solids.names
     shared: list[tuple[int, int]] = []
     hidden: set[int] = set()
     for a, b in pairs[:MOST_PAIRS]:
-        point, first, second = _compare(solids, a, b, lines)
-        if point is None:
+        found = _compare(solids, a, b, lines)
+        if found.point is None:
+            yield from _film(solids, a, b, found)
             continue
         shared.append((a, b))
-        if first and second:
+        if found.first and found.second:
+            gape = _gape(solids, a, b, found)
+            elsewhere = f"; elsewhere {gape}" if gape else ""
             yield (
-                f"{names[a]} and {names[b]} overlap: both hold {_place(point)}, and neither lies in the other; {names[b]}, "
-                "which is listed later, fills the space that they share"
+                f"{names[a]} and {names[b]} overlap: both hold {_place(found.point)}, and neither lies in the other; "
+                f"{names[b]}, which is listed later, fills the space that they share{elsewhere}"
             )
-        elif not first and a not in hidden:
+        elif not found.first and a not in hidden:
             hidden.add(a)
             yield (
-                f"{names[a]} lies in {names[b]}, which is listed later and fills its space, as at {_place(point)}; light "
-                f"never meets {names[a]}: list it after {names[b]}"
+                f"{names[a]} lies in {names[b]}, which is listed later and fills its space, as at {_place(found.point)}; "
+                f"light never meets {names[a]}: list it after {names[b]}"
             )
     yield from _crowds(solids, shared)
+    known = set(pairs)
+    touching = list(itertools.islice((pair for pair in _near(solids, -BESIDE) if pair not in known), MOST_PAIRS))
+    for a, b in touching:
+        yield from _film(solids, a, b, _compare(solids, a, b, _lines_for(touching)))
     if len(pairs) > MOST_PAIRS:
         yield f"more than {MOST_PAIRS} pairs of solids are near each other; {MOST_PAIRS} were looked at for overlaps"
 
 
-def _near(solids: _Solids) -> Iterator[tuple[int, int]]:
-    """Pairs of solids whose boxes have a space in common, the first listed first."""
+def _lines_for(pairs: Sequence[tuple[int, int]]) -> int:
+    return min(MOST_LINES, max(FEWEST_LINES, ALL_LINES // max(1, 2 * len(pairs))))
+
+
+def _film(solids: _Solids, a: int, b: int, found: _Shared) -> Iterator[str]:
+    """What is told of two solids that share nothing, were meant to touch, and do not."""
+    if solids.opaque[a] and solids.opaque[b]:
+        return
+    names, thin = solids.names, found.films <= BESIDE * solids.sizes[[a, b]].min()
+    if thin.sum() >= FEWEST_FILMS:
+        where = int(np.flatnonzero(thin)[np.argsort(found.films[thin])[thin.sum() // 2]])
+        yield (
+            f"{names[a]} and {names[b]} touch but for a film {found.films[where]:.2g} mm thick, as at "
+            f"{_place(found.places[where])}: light is refracted and reflected on both its sides, as by a gap; let "
+            f"{names[b]}, which is listed later, reach a little into {names[a]}"
+        )
+    elif gape := _gape(solids, a, b, found):
+        yield f"{names[a]} and {names[b]} do not touch everywhere: {gape}"
+
+
+def _gape(solids: _Solids, a: int, b: int, found: _Shared) -> str:
+    """The film between two solids, if triangles stand for a curved surface that both seem to have; else nothing."""
+    forms = np.unique(solids.faces.form[np.isin(solids.owner, [a, b])])
+    rounded = any(solids.faces.forms[form]["shape"].get("normals") is not None for form in forms)
+    near = np.sort(found.films[found.films < THIN * solids.sizes[[a, b]].min()])
+    few = len(near) < max(FEWEST_FILMS, FILMS * (len(near) + found.common), 0.5 * len(found.films))
+    # What is as thin nowhere as its mean says was left on purpose.
+    if few or not rounded or near[len(near) // 20] > VARIED * near[len(near) // 2]:
+        return ""
+    return (
+        f"a film of some {near[len(near) // 2]:.2g} mm is left between them, as by a gap. If triangles stand for one curved surface "
+        f"there, give both the same 'tolerance', or let {solids.names[b]}, which is listed later, reach into "
+        f"{solids.names[a]}"
+    )
+
+
+def _near(solids: _Solids, least: float = BESIDE) -> Iterator[tuple[int, int]]:
+    """Pairs of solids whose boxes have so much of their sizes in common along each axis, the first listed first."""
     order = np.argsort(solids.low[:, 0], kind="stable")
     # By axis, since only one is looked at at a time.
     low, high = np.ascontiguousarray(solids.low[order].T), np.ascontiguousarray(solids.high[order].T)
     sizes = solids.sizes[order]
     # How many of those that begin later along x begin before each has ended.
-    counts = np.maximum(np.searchsorted(low[0], high[0]) - np.arange(1, len(order) + 1), 0)
+    ends = high[0] + max(-least, 0.0) * np.where(np.isfinite(sizes), sizes, 0.0)
+    counts = np.maximum(np.searchsorted(low[0], ends) - np.arange(1, len(order) + 1), 0)
     start = 0
     while start < len(order):
         # So many solids at a time that their pairs take little memory; one at least.
@@ -256,15 +313,31 @@ def _near(solids: _Solids) -> Iterator[tuple[int, int]]:
         for axis in (1, 2, 0):
             begin, end = low[axis], high[axis]
             common = np.minimum(end[first], end[second]) - np.maximum(begin[first], begin[second])
-            near = common > BESIDE * np.minimum(sizes[first], sizes[second])
+            near = common > least * np.minimum(sizes[first], sizes[second])
             first, second = first[near], second[near]
         pairs = np.sort(order[np.stack([first, second], axis=1)], axis=1)
         yield from ((int(a), int(b)) for a, b in pairs)
         start = stop
 
 
-def _compare(solids: _Solids, a: int, b: int, lines: int) -> tuple[Array | None, bool, bool]:
-    """A point in the midst of what two solids share, if they do; and whether each has space of its own."""
+class _Shared(NamedTuple):
+    """What lines say of two solids.
+
+    A point in the midst of what they share, if they do; whether the first and the second have space of their own; how many
+    stretches of lines they share, and the longest [mm]; how long those from one to the other are that neither holds [mm],
+    and a point in each.
+    """
+
+    point: Array | None
+    first: bool
+    second: bool
+    common: int
+    depth: float
+    films: Array
+    places: Array
+
+
+def _compare(solids: _Solids, a: int, b: int, lines: int) -> _Shared:
     low, high = solids.low[[a, b]], solids.high[[a, b]]
     reach = float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
     small = min((a, b), key=lambda solid: solids.sizes[solid])
@@ -276,13 +349,25 @@ def _compare(solids: _Solids, a: int, b: int, lines: int) -> tuple[Array | None,
     line, solid, t = line[kept], solid[kept], t[kept]
     # Stretches from each crossing to the next of the same line.
     length = np.where(line[1:] == line[:-1], np.diff(t), 0.0)
-    thick = length > BESIDE * solids.sizes[[a, b]].min()
-    first, second = (_held(line, solid == which)[:-1] & thick for which in (a, b))
-    if not (first & second).any():
-        return None, True, True
-    best = int(np.argmax(np.where(first & second, length, 0.0)))
-    point = starts[line[best]] + (t[best] + length[best] / 2.0) * directions[line[best]]
-    return point, bool((first & ~second).any()), bool((second & ~first).any())
+    size = solids.sizes[[a, b]].min()
+    one, other = (_held(line, solid == which)[:-1] for which in (a, b))
+    between = ~one & ~other & (solid[1:] != solid[:-1]) & (length > ROUNDING * size)
+    films = np.flatnonzero(between & np.isin(line[:-1], line[:-1][one]) & np.isin(line[:-1], line[:-1][other]))
+    middles = starts[line[films]] + (t[films] + length[films] / 2.0)[:, None] * directions[line[films]]
+    first, second = one & (length > BESIDE * size), other & (length > BESIDE * size)
+    both, point = first & second, None
+    if both.any():
+        best = int(np.argmax(np.where(both, length, 0.0)))
+        point = starts[line[best]] + (t[best] + length[best] / 2.0) * directions[line[best]]
+    return _Shared(
+        point,
+        bool((first & ~second).any()),
+        bool((second & ~first).any()),
+        int(both.sum()),
+        float(length[both].max(initial=0.0)),
+        length[films],
+        middles,
+    )
 
 
 def _held(line: Numbers, crossed: Flags) -> Flags:

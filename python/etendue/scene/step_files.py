@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from etendue.errors import FormatError, UnknownNameError
 from etendue.extras import require
-from etendue.scene.triangles import chord_error, open_edges, smooth_where_round, volume, welded
+from etendue.scene.triangles import as_written, chord_error, open_edges, smooth_where_round, volume, welded
 from etendue.units import MM_PER_LENGTH_UNIT
 
 Array = npt.NDArray[np.float64]
@@ -34,8 +34,9 @@ COARSE_TURN = 0.5
 MOST_TRIANGLES = 1 << 23
 """Of all bodies of a file."""
 
-ANYTHING = 1e9
-"""[mm] A tolerance that asks for nothing: of a first look, which tells the sizes."""
+FIRST_LOOK = 0.1
+"""Of a first look, which tells bodies and sizes: distance between a surface and its triangles as a part of each edge. One
+length for the whole file would leave nothing of round faces of splines that are smaller than it."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -120,14 +121,14 @@ def read_step(path: Path, raw: bytes, tolerance: float | None, name: str | None 
     cut.step
     """
     names = _Names(raw.decode("latin-1"))
-    first = _bodies(path, _meshed(path, raw, ANYTHING, COARSE_TURN), names)
+    first = _bodies(path, _meshed(path, raw, FIRST_LOOK, COARSE_TURN, relative=True), names)
     if name is not None and name not in [body.name for body in first]:
         error = UnknownNameError("body", name, [body.name for body in first])
         raise FormatError(path, "body", str(error), "")
     wanted = [body for body in first if name in (None, body.name)]
     turn = TURN if tolerance is None else COARSE_TURN
-    if tolerance is None:
-        tolerance = SHARE * min(float(body.size.max()) for body in wanted)
+    smallest = min(float(body.size.max()) for body in wanted)
+    tolerance = min(FIRST_LOOK * smallest, SHARE * smallest if tolerance is None else tolerance)
     # Chord errors go with the area of triangles.
     needed = sum(len(body.triangles) * max(1.0, body.chord_error / tolerance) for body in first)
     if needed > MOST_TRIANGLES:
@@ -144,10 +145,12 @@ def read_step(path: Path, raw: bytes, tolerance: float | None, name: str | None 
     return [body for body in found if name in (None, body.name)]
 
 
-def _meshed(path: Path, raw: bytes, tolerance: float, turn: float) -> bytes:
+def _meshed(path: Path, raw: bytes, tolerance: float, turn: float, *, relative: bool = False) -> bytes:
     cascadio = require("cascadio")
     try:
-        made: bytes = cascadio.load(raw, tol_linear=tolerance, tol_angular=turn, include_brep=True)
+        made: bytes = cascadio.load(
+            raw, tol_linear=tolerance, tol_angular=turn, tol_relative=relative, include_brep=True
+        )
     except Exception as error:  # noqa: BLE001 - whatever a damaged file makes the library raise
         raise FormatError(path, "STEP", f"cannot be read ({error})", "The file is damaged, or no mesh.") from None
     if not made:
@@ -218,7 +221,7 @@ class _Gltf:
             if primitive.get("mode", 4) != 4:
                 continue
             extension = primitive["extensions"]["TM_brep_faces"]
-            vertices.append(self.array(primitive["attributes"]["POSITION"]).astype(np.float64))
+            vertices.append(as_written(self.array(primitive["attributes"]["POSITION"]).astype(np.float64)))
             normals.append(self.array(primitive["attributes"]["NORMAL"]).astype(np.float64))
             triangles.append(self.array(primitive["indices"]).astype(np.int64).reshape(-1, 3) + corners)
             faces.append(self.array(extension["faceIndices"]).astype(np.int64).reshape(-1) + numbered)

@@ -19,6 +19,12 @@ MOST_PAIRS = 1 << 34
 PLANE = 3e-6
 """Normals in single precision that differ by less from that of a triangle are its own."""
 
+DIGITS = 7
+"""Of numbers in single precision, whose neighbours are 6·10⁻⁸ to 1.2·10⁻⁷ of them away."""
+
+TEN_DIGITS = (1e-12, 1e12)
+"""Sizes of numbers that have so many digits by exact powers of ten."""
+
 SMALLEST_TURN = 0.05
 """[°] Neighbours that turn by less are one plane, as files in single precision store it."""
 
@@ -49,6 +55,34 @@ def welded(vertices: Array, triangles: Triangles) -> tuple[Array, Triangles]:
     triangles = triangles[(normals != 0.0).any(axis=1)]
     used, number = np.unique(triangles, return_inverse=True)
     return kept[used], number.reshape(-1, 3)
+
+
+def as_written(numbers: Array) -> Array:
+    """Numbers of single precision as they were before they were stored: those that seven digits tell, by these digits.
+
+    A face at 3.1 mm is at 3.0999999 mm in a file of single precision, and does not coincide with one at 3.1 mm any more: a
+    film of air between both reflects what two touching bodies let pass.
+
+    Parameters
+    ----------
+    numbers : array
+        Those that single precision does not hold, and those that seven digits do not tell, stay what they are.
+
+    Examples
+    --------
+    >>> as_written(np.array([np.float32(3.1), np.float32(np.pi), 3.1000001, 0.0])).tolist()
+    [3.1, 3.1415927410125732, 3.1000001, 0.0]
+    """
+    size = np.abs(numbers)
+    with np.errstate(over="ignore"):  # what single precision does not hold becomes infinite, and is not equal
+        # Beyond these limits powers of ten are no exact doubles.
+        stored = (size > TEN_DIGITS[0]) & (size < TEN_DIGITS[1]) & (numbers.astype(np.float32) == numbers)
+    size = np.where(stored, size, 1.0)
+    powers = 10.0 ** (DIGITS - 1.0 - np.floor(np.log10(size)))
+    digits = np.copysign(np.rint(size * powers), numbers)
+    rounded = np.where(powers >= 1.0, digits / powers, digits * np.rint(1.0 / powers))
+    found: Array = np.where(stored & (rounded.astype(np.float32) == numbers), rounded, numbers)
+    return found
 
 
 def directed_areas(vertices: Array, triangles: Triangles) -> tuple[Array, Array]:
