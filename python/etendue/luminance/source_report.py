@@ -116,7 +116,7 @@ class SourceReport:
                     ("θ", f"{lmap.observer.theta:g}°"),
                     ("φ", f"{lmap.observer.phi:g}°"),
                     ("largest pixel", measured(lmap.values[row, column], lmap.standard_error[row, column], unit)),
-                    ("intensity", f"{lmap.intensity:.4g} {self.intensity.unit}"),
+                    ("intensity", counted(lmap.intensity, self.intensity.unit)),
                     ("error, weighted by flux", "unknown" if error is None else f"{error.flux_weighted:.2%}"),
                 ]
             )

@@ -51,6 +51,10 @@ def counted(value: float, unit: str, digits: int = 4) -> str:
     --------
     >>> counted(18312345.0, "cd/m²"), counted(0.25, "lm"), counted(4.2e-7, "cd")
     ('18.31 × 10⁶ cd/m²', '0.25 lm', '420 × 10⁻⁹ cd')
+    >>> counted(0.99999999e-9, "W")
+    '1 × 10⁻⁹ W'
     """
+    if math.isfinite(value):
+        value = float(f"{value:.{digits}g}")  # before its power is chosen
     power = common_power(value, value)
     return f"{value / 10.0**power:.{digits}g} × {ten_to(power)} {unit}" if power else f"{rounded(value, digits)} {unit}"
