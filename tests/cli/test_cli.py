@@ -657,6 +657,16 @@ def test_compare_draws_the_difference_and_the_cuts(run: Run, maps: tuple[Path, P
     assert run("compare", *maps, "--section-x", 0.2, "--section-output", "x.png", "--json").json["outputs"] == ["x.png"]
 
 
+def test_compare_writes_nothing_if_a_cut_is_off_the_screen(run: Run, maps: tuple[Path, Path], tmp_path: Path) -> None:
+    outcome = run("compare", *maps, "-o", "d.png", "--section-y", 1e3, "--section-output", "s.png")
+    assert outcome.status == 1
+    assert "off the screen" in outcome.err
+    assert files(tmp_path) == []
+    outcome = run("compare", *maps, "--section-y", 0, "--section-x", 0, "--section-output", "s.png")
+    assert outcome.status == 2
+    assert "one picture shows one of them" in " ".join(outcome.err.split())
+
+
 def test_maps_of_different_views_are_compared_only_on_request(
     run: Run, maps: tuple[Path, Path], tmp_path: Path
 ) -> None:

@@ -315,6 +315,21 @@ def test_cross_sections_draw_steps_with_bands(tmp_path: Path) -> None:
     assert imread(tmp_path / "cut.png").ndim == 3
 
 
+def test_a_cross_section_with_labels_says_where_and_shows_lines_on_the_axis() -> None:
+    """The picture alone must tell the place; a line of zeros is drawn over the axis, not clipped by it."""
+    dark = LuminanceMap(
+        np.zeros((4, 4)), np.zeros((4, 4)), np.zeros((4, 4), dtype=int), Observer(0, 0, 100), Screen(8, 8, 4, 4)
+    )
+    figure = plot_cross_sections([cross_section(dark, x=-1)], labels=["a"])
+    assert any("x = −1 mm" in text.get_text() for text in figure.texts)
+    (*_, line) = figure.axes[0].patches
+    assert not line.get_clip_on()
+    assert line.get_zorder() > max(spine.get_zorder() for spine in figure.axes[0].spines.values())
+    assert not any(
+        "mm" in text.get_text() for text in plot_cross_sections([cross_section(dark, x=-1)], title="Cut").texts
+    )
+
+
 def test_cross_sections_of_several_maps_are_told_apart() -> None:
     lmap = make_map([[1.0, 4.0, 3.0, 2.0]])
     other = lmap.replace(provenance=Provenance("/data/second.ray"))

@@ -57,6 +57,8 @@ def compare(
     scaling, shown = one_of(scale, SCALES, "--scale"), one_of(difference, DIFFERENCES, "--difference")
     if (section_output is None) != (section_x is None and section_y is None):
         raise typer.BadParameter("--section-output goes with --section-x or --section-y")
+    if section_x is not None and section_y is not None:
+        raise typer.BadParameter("--section-x and --section-y: one picture shows one of them; run the command for each")
     check_outputs([p for p in (output, section_output) if p], PICTURE_EXTENSIONS)
     if output is None:
         refuse(["difference"], "for the picture of the difference; add -o picture.png, or leave it out")
@@ -67,10 +69,11 @@ def compare(
         limits = parse_region(region)
     a, b = read_map(test), read_map(reference)
     result = compare_maps(a, b, region=limits, dead=rule, ignore_geometry=ignore_geometry)
+    # Before anything is written: a place may be off the screen.
+    cuts = [cross_section(lmap, x=section_x, y=section_y) for lmap in (a, b) if section_output is not None]
     if output is not None:
         plot_comparison(result, output, scaling, difference=shown, labels=(test.name, reference.name))
     if section_output is not None:
-        cuts = [cross_section(lmap, x=section_x, y=section_y) for lmap in (a, b)]
         plot_cross_sections(cuts, section_output, scaling, labels=[test.name, reference.name])
     if json:
         print_json(result.to_dict() | {"outputs": [p for p in (output, section_output) if p]})

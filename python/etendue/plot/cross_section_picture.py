@@ -76,7 +76,8 @@ def plot_cross_sections(
     scale : {"auto", "linear", "log"}
         Scale of the luminance; ``"auto"`` is that of `plot_map`.
     labels : sequence of str, optional
-        One name per section; by default where it was cut, with the map's origin where these differ.
+        One name per section; by default where it was cut, with the map's origin where these differ. With labels the title
+        tells where, if that is one place.
     title : str, optional
         First line; "Cross section" and where the map comes from if not given.
     ax : matplotlib.axes.Axes, optional
@@ -108,10 +109,16 @@ def plot_cross_sections(
     sources = {section.source for section in sections}
     names = labels if labels is not None else [_place(section, of_several=len(sources) > 1) for section in sections]
     what = "Cross section" + ("s" if len(sections) > 1 else "")
-    heading = title if title is not None else style.headed(what, sources.pop() if len(sources) == 1 else "")
+    places = {f", {'y' if section.axis == 'x' else 'x'} = {style.plain(section.at)} mm" for section in sections}
+    # Labels do not tell where.
+    where = places.pop() if labels is not None and len(places) == 1 else ""
+    source = sources.pop() if len(sources) == 1 else ""
+    heading = title if title is not None else style.headed(what, source, 4.4 - 0.1 * len(where)) + where
     if ax is not None:
         style.given_axes(ax, 1, path)
         _draw_all(ax, sections, names, scale)
+        for line in ax.patches:
+            line.set_clip_on(True)  # whose axes they are may look at a part
         style.put_title(ax, heading)
         style.put_legend(ax, loc="best")
         return ax
@@ -177,7 +184,9 @@ def _draw(axes: Axes, section: CrossSection, name: str, number: int) -> None:
     if axes.get_yscale() == "log":
         low = np.where(np.isnan(low), np.nan, np.maximum(low, axes.get_ylim()[0]))
     axes.stairs(high, edges, baseline=low, fill=True, color=colour, alpha=0.22, linewidth=0.0)
-    axes.stairs(section.values, edges, baseline=None, color=colour, linestyle=dashes, linewidth=1.1, label=name)
+    line = axes.stairs(section.values, edges, baseline=None, color=colour, linestyle=dashes, linewidth=1.1, label=name)
+    if axes.get_yscale() != "log":  # all of it is within the limits, and nothing at all lies on the axis
+        line.set(clip_on=False, zorder=3)
 
 
 def _band(section: CrossSection) -> tuple[Array, Array]:
