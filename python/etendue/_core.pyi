@@ -46,6 +46,7 @@ __all__ = [
     "ray_keys",
     "rays_of_part",
     "read_colours",
+    "read_pieces",
     "read_rays",
     "scan",
     "scan_colours",
@@ -317,6 +318,9 @@ _Source: TypeAlias = RayTable | RingSource | FieldRays
 
 def read_rays(source: _Source, start: int, stop: int) -> tuple[_Floats, _Floats, _Floats]:
     """Rays ``start..stop`` as (position (n, 3) [mm], unit direction (n, 3), flux (n,))."""
+
+def read_pieces(source: _Source, ranges: Sequence[tuple[int, int]]) -> tuple[_Floats, _Floats, _Floats]:
+    """The rays of ranges (start, stop), one after another, as of `read_rays`."""
 
 def ray_keys(position: _Floats, direction: _Floats) -> npt.NDArray[np.uint64]:
     """A key of each ray's place and direction (n, 3), to single precision: the same for copies, another for others."""

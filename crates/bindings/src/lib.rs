@@ -49,6 +49,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<bright_spots::BrightSpots>()?;
     module.add_class::<survey::Survey>()?;
     module.add_class::<dealing::Dealing>()?;
+    module.add_function(wrap_pyfunction!(source::read_pieces, module)?)?;
     module.add_function(wrap_pyfunction!(source::read_rays, module)?)?;
     module.add_function(wrap_pyfunction!(source::read_colours, module)?)?;
     module.add_function(wrap_pyfunction!(ray_keys::ray_keys, module)?)?;

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use etendue_geometry::ray_batch::BLOCK;
 use etendue_geometry::table::{Column, Float, Layout, Number, RayTable as CoreTable};
 use etendue_geometry::{RayBatch, RaySource};
 use etendue_lightfield::field::draw::FieldRays as CoreFieldRays;
@@ -232,18 +233,36 @@ type RayArrays<'py> = (
 /// Rays `start..stop` as (position (n, 3) \[mm\], unit direction (n, 3), flux (n,)).
 #[pyfunction]
 pub fn read_rays<'py>(py: Python<'py>, source: &Bound<'py, PyAny>, start: u64, stop: u64) -> PyResult<RayArrays<'py>> {
+    read_pieces(py, source, vec![(start, stop)])
+}
+
+/// The rays of some ranges (start, stop), one after another, as (position (n, 3) \[mm\], unit direction (n, 3), flux (n,)).
+#[pyfunction]
+pub fn read_pieces<'py>(
+    py: Python<'py>,
+    source: &Bound<'py, PyAny>,
+    ranges: Vec<(u64, u64)>,
+) -> PyResult<RayArrays<'py>> {
     with_source(source, |source| {
-        if start > stop || stop > source.len() {
-            return Err(PyValueError::new_err(format!(
-                "rays {start}..{stop} of {}",
-                source.len()
-            )));
+        let mut n = 0;
+        for (start, stop) in &ranges {
+            if start > stop || *stop > source.len() {
+                return Err(PyValueError::new_err(format!(
+                    "rays {start}..{stop} of {}",
+                    source.len()
+                )));
+            }
+            n += usize::try_from(stop - start)?;
         }
-        let n = usize::try_from(stop - start)?;
         let (mut position, mut direction, mut flux) = (vec![0.0; 3 * n], vec![0.0; 3 * n], vec![0.0; n]);
         py.detach(|| {
-            let mut at = 0;
-            source.for_each_block(start..stop, |_, batch| {
+            let (mut at, mut batch) = (0, RayBatch::default());
+            let blocks = ranges.into_iter().flat_map(|(start, stop)| {
+                let first = (start..stop).step_by(BLOCK);
+                first.map(move |first| first..(first + BLOCK as u64).min(stop))
+            });
+            for block in blocks {
+                source.fill(block, &mut batch);
                 for i in 0..batch.len {
                     for axis in 0..3 {
                         position[3 * (at + i) + axis] = batch.position[axis][i];
@@ -252,7 +271,7 @@ pub fn read_rays<'py>(py: Python<'py>, source: &Bound<'py, PyAny>, start: u64, s
                 }
                 flux[at..at + batch.len].copy_from_slice(&batch.flux[..batch.len]);
                 at += batch.len;
-            });
+            }
         });
         Ok((
             PyArray1::from_vec(py, position).reshape([n, 3])?,

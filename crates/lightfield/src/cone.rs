@@ -82,12 +82,11 @@ impl Prepared {
         }
     }
 
-    fn collect(&self, batch: &RayBatch, cosine: &mut [f64], hits: &mut Vec<Hit>) {
-        let n = batch.len;
-        let [kx, ky, kz] = &batch.direction;
-        cosines(self.axis, [&kx[..n], &ky[..n], &kz[..n]], &mut cosine[..n]);
-        for (i, &c) in cosine[..n].iter().enumerate() {
-            if c >= self.cos_field && batch.flux[i] > 0.0 {
+    fn collect(&self, batch: &RayBatch, ahead: &mut Vec<usize>, hits: &mut Vec<Hit>) {
+        let directions = batch.direction.each_ref().map(|axis| &axis[..batch.len]);
+        heading(self.axis, self.cos_field, directions, ahead);
+        for &i in &*ahead {
+            if batch.flux[i] > 0.0 {
                 let k = batch.direction(i);
                 let Some(pixel) = self.view.pixel(batch.position(i), k) else {
                     continue;
@@ -114,12 +113,25 @@ impl Prepared {
     }
 }
 
-/// Cosine of each direction to `axis`: several rays at a time, the same bits on every instruction set.
+/// Directions that are compared with the axis together: most of them have none among them that heads for it.
+const TOGETHER: usize = 32;
+
+/// The numbers of the directions whose cosine to `axis` is not below a least one: several at a time, the same bits on every
+/// instruction set.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn cosines(axis: [f64; 3], directions: [&[f64]; 3], cosine: &mut [f64]) {
+fn heading(axis: [f64; 3], least: f64, directions: [&[f64]; 3], found: &mut Vec<usize>) {
+    found.clear();
     let [kx, ky, kz] = directions;
-    for (((c, x), y), z) in cosine.iter_mut().zip(kx).zip(ky).zip(kz) {
-        *c = x * axis[0] + y * axis[1] + z * axis[2];
+    let chunks = kx.chunks(TOGETHER).zip(ky.chunks(TOGETHER)).zip(kz.chunks(TOGETHER));
+    for (first, ((kx, ky), kz)) in (0..).step_by(TOGETHER).zip(chunks) {
+        let (mut cosines, mut any) = ([f64::NEG_INFINITY; TOGETHER], false);
+        for (((cosine, x), y), z) in cosines.iter_mut().zip(kx).zip(ky).zip(kz) {
+            *cosine = x * axis[0] + y * axis[1] + z * axis[2];
+            any |= *cosine >= least;
+        }
+        if any {
+            found.extend((0..kx.len()).filter(|i| cosines[*i] >= least).map(|i| first + i));
+        }
     }
 }
 
@@ -142,11 +154,11 @@ pub fn cone_sums(
     let work = |range: Range<u64>| {
         let mut part = PassAccount::default();
         let mut hits: Vec<Vec<Hit>> = prepared.iter().map(|_| Vec::new()).collect();
-        let mut cosine = vec![0.0; etendue_geometry::ray_batch::BLOCK];
+        let mut ahead = Vec::new();
         source.for_each_block(range, |_, batch| {
             part.add_block(batch);
             for (cone, found) in prepared.iter().zip(&mut hits) {
-                cone.collect(batch, &mut cosine, found);
+                cone.collect(batch, &mut ahead, found);
             }
         });
         (part, hits)

@@ -71,16 +71,14 @@ def pilot_sample(rays: RayStream, at_most: int) -> RaySet:
         room = n // pieces - STRETCH + 1
         starts = parts_begin + np.random.default_rng(PLACES).integers(0, room, pieces)
         ends = [(start, start + STRETCH) for start in starts.tolist()]
-    parts = [_core.read_rays(source, start, stop) for start, stop in ends]
-    if parts:
-        position, direction, flux = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-        carry = flux > 0
-        if carry.any():
-            _check_squares(flux[carry], rays)
-            kept = (position[carry], direction[carry], flux[carry])
-            sample = RaySet(*kept, flux_unit=rays.flux_unit, provenance=rays.provenance)
-            _SAMPLES[sample] = float(carry.mean())
-            return sample
+    position, direction, flux = _core.read_pieces(source, ends)
+    carry = flux > 0
+    if carry.any():
+        _check_squares(flux[carry], rays)
+        kept = (position, direction, flux) if carry.all() else (position[carry], direction[carry], flux[carry])
+        sample = RaySet(*kept, flux_unit=rays.flux_unit, provenance=rays.provenance)
+        _SAMPLES[sample] = float(carry.mean())
+        return sample
     raise ArgumentError("these rays carry no flux, so no light field can be fitted to them.")
 
 

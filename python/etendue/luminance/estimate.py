@@ -12,7 +12,7 @@ from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.pilot_sample import check_near_field
 from etendue.luminance.cone_map import look_through_cone
-from etendue.luminance.framing import beyond_notes, framed_screens, is_far, missed_notes, probe, shows_whole
+from etendue.luminance.framing import Lines, beyond_notes, framed_screens, is_far, missed_notes, probe, shows_whole
 from etendue.luminance.looking import look_at_field
 from etendue.luminance.method_choice import choose_method
 from etendue.luminance.methods import AnyMethod, Cone, FromField, MethodName, PathTracing
@@ -314,8 +314,8 @@ def _with_missed(
     whole = [isinstance(lit, LightField) and shows_whole(lit, lmap) for lmap in maps]
     if isinstance(source, LightField) and all(whole) and all(is_far(source, lmap) for lmap in maps):
         return maps
-    some = probe(source)
-    seen = some if lit is source or all(whole) else probe(lit)
+    some = Lines.of(probe(source))
+    seen = some if lit is source or all(whole) else Lines.of(probe(lit))
     notes = []
     for lmap, all_of_it in zip(maps, whole, strict=True):
         view = lmap.observer, lmap.screen

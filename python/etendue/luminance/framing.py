@@ -54,6 +54,45 @@ MOST_MISSED = 0.1
 """Share of the light towards the observer that a screen may miss without a note."""
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Lines:
+    """Rays with their columns at hand, which a set forms anew each time that it is asked for them.
+
+    Parameters
+    ----------
+    position, direction : array, shape (n, 3)
+        [mm], unit vectors.
+    flux : array, shape (n,)
+        [flux unit of the rays]
+    focus : array, shape (3,)
+        The point that the lines come closest to [mm].
+    source : str
+        Where the rays come from.
+    """
+
+    position: Array
+    direction: Array
+    flux: Array
+    focus: Array
+    source: str
+
+    @classmethod
+    def of(cls, rays: RaySet | Lines) -> Lines:
+        """Those of a set; of lines themselves.
+
+        Examples
+        --------
+        >>> import etendue as et
+        >>> lines = Lines.of(et.RingSource(rays=1000).ray_set())
+        >>> lines.position.shape, Lines.of(lines) is lines
+        ((1000, 3), True)
+        """
+        if isinstance(rays, Lines):
+            return rays
+        focus = np.array(rays.virtual_focus.point)
+        return cls(rays.position, rays.direction, rays.flux, focus, rays.provenance.source)
+
+
 @dataclasses.dataclass(frozen=True)
 class Light:
     """Rays that head for an observer, where they cross a plane.
@@ -85,7 +124,7 @@ def probe(source: RayStream | LightField) -> RaySet:
     return source.sample(PROBED) if isinstance(source, LightField) else pilot_sample(source, PROBED)
 
 
-def light_towards(rays: RaySet, observer: Observer, screen: Screen) -> Light:
+def light_towards(rays: RaySet | Lines, observer: Observer, screen: Screen) -> Light:
     """Those of the rays that head for the observer, where their lines cross the plane of the screen.
 
     Examples
@@ -97,20 +136,19 @@ def light_towards(rays: RaySet, observer: Observer, screen: Screen) -> Light:
     >>> abs(light.share(screen) - 100 / np.pi * 300 / 600 * np.pi / 100) < 0.05, light.cone
     (True, 6.0)
     """
+    lines = Lines.of(rays)
     right, up, normal = screen.axes(observer)
-    direction = rays.direction
+    direction = lines.direction
     # From where on its line a ray heads somewhere: from where it comes closest to the middle of the light.
-    away = rays.position - np.asarray(rays.virtual_focus.point)
-    start = rays.position - np.einsum("ij,ij->i", away, direction)[:, None] * direction
+    along = np.einsum("ij,ij->i", lines.position - lines.focus, direction)
+    start = lines.position - along[:, None] * direction
     towards = observer.position - start
     cosine = np.einsum("ij,ij->i", towards, direction) / np.maximum(lengths(towards), np.finfo(float).tiny)
     cone = next((a for a in CONES if (cosine > np.cos(np.radians(a))).sum() >= ENOUGH), CONES[-1])
     heading = cosine > np.cos(np.radians(cone))
-    start, direction = start[heading] - np.asarray(observer.target), direction[heading]
-    crossing = _crossing(start, direction, normal)
-    return Light(
-        np.nan_to_num(crossing @ right, nan=np.inf), np.nan_to_num(crossing @ up, nan=np.inf), rays.flux[heading], cone
-    )
+    crossing = _crossing(start[heading] - np.asarray(observer.target), direction[heading], normal)
+    across, upwards = (np.nan_to_num(crossing @ axis, nan=np.inf) for axis in (right, up))
+    return Light(across, upwards, lines.flux[heading], cone)
 
 
 def _crossing(start: Array, direction: Array, normal: Array) -> Array:
@@ -119,7 +157,7 @@ def _crossing(start: Array, direction: Array, normal: Array) -> Array:
     return np.asarray(start - ((start @ normal) / np.where(slope == 0.0, np.nan, slope))[:, None] * direction)
 
 
-def framed(rays: RaySet, observer: Observer, columns: int = 128, rows: int = 128) -> Screen:
+def framed(rays: RaySet | Lines, observer: Observer, columns: int = 128, rows: int = 128) -> Screen:
     """The smallest screen of square pixels, about the observer's target, that shows the light which heads for him.
 
     Strays do not count: along each axis 0.5 % of the light may lie beyond. The size is rounded up to two digits.
@@ -135,10 +173,11 @@ def framed(rays: RaySet, observer: Observer, columns: int = 128, rows: int = 128
     >>> framed(et.RingSource(rays=200_000).ray_set(), et.Observer(0, 0, 1000), 64, 32)
     Screen(width=130.0, height=65.0, columns=64, rows=32, plane='view')
     """
-    light = light_towards(rays, observer, Screen(1.0, 1.0, columns, rows))
+    lines = Lines.of(rays)
+    light = light_towards(lines, observer, Screen(1.0, 1.0, columns, rows))
     if not light.flux.any():
         raise ArgumentError(
-            f"no ray of {rays.provenance.source} heads for the observer at θ {observer.theta:g}°, φ {observer.phi:g}°: "
+            f"no ray of {lines.source} heads for the observer at θ {observer.theta:g}°, φ {observer.phi:g}°: "
             "from there the source is dark. Choose another observer, or state the screen's size."
         )
     reach = [_quantile(np.abs(axis), light.flux) for axis in (light.right, light.up)]
@@ -220,7 +259,7 @@ def is_far(field: LightField, lmap: LuminanceMap) -> bool:
     return bool(max(reach) < lmap.observer.distance)
 
 
-def centre_of_light(rays: RaySet) -> tuple[float, float, float]:
+def centre_of_light(rays: RaySet | Lines) -> tuple[float, float, float]:
     """The point to look at [mm]: the one that the lines of the rays come closest to, or the middle of where they start.
 
     Rounded to a hundredth of the distance at which the lines pass it.
@@ -231,14 +270,15 @@ def centre_of_light(rays: RaySet) -> tuple[float, float, float]:
     >>> centre_of_light(et.RingSource(rays=100_000).ray_set().moved((3, 0, 7)))
     (3.0, 0.0, 7.0)
     """
-    point = np.array(rays.virtual_focus.point)
-    off = lengths(np.cross(rays.position - point, rays.direction))
-    step = 10.0 ** np.floor(np.log10(max(_quantile(off, rays.flux), 1e-6))) / 10.0
+    lines = Lines.of(rays)
+    point = lines.focus
+    off = lengths(np.cross(lines.position - point, lines.direction))
+    step = 10.0 ** np.floor(np.log10(max(_quantile(off, lines.flux), 1e-6))) / 10.0
     x, y, z = np.round(point / step) * step + 0.0
     return (float(f"{x:.12g}"), float(f"{y:.12g}"), float(f"{z:.12g}"))
 
 
-def beyond_notes(rays: RaySet, observer: Observer, screen: Screen) -> tuple[str, ...]:
+def beyond_notes(rays: RaySet | Lines, observer: Observer, screen: Screen) -> tuple[str, ...]:
     """What is to be said of rays that start beyond the observer, as seen from the screen, but whose lines pass him.
 
     Where on its line a ray starts has no influence on a map: rays are often recorded on a surface about their source, which
@@ -253,8 +293,12 @@ def beyond_notes(rays: RaySet, observer: Observer, screen: Screen) -> tuple[str,
     >>> beyond_notes(lamps.moved((0, 0, 600)), et.Observer(0, 0, 300), et.Screen(200, 200, 1, 1))[0][:56]
     'about 100% of the light that the map shows starts beyond'
     """
+    lines = Lines.of(rays)
     right, up, normal = screen.axes(observer)
-    start, direction = rays.position - np.asarray(observer.target), rays.direction
+    beyond = np.einsum("ij,ij->i", lines.position - observer.position, lines.direction) > 0.0
+    if not beyond.any():
+        return ()
+    start, direction = lines.position - np.asarray(observer.target), lines.direction
     crossing = _crossing(start, direction, normal)
     on_screen = (np.abs(crossing @ right) <= screen.width / 2) & (np.abs(crossing @ up) <= screen.height / 2)
     towards = observer.position - np.asarray(observer.target) - crossing
@@ -263,9 +307,8 @@ def beyond_notes(rays: RaySet, observer: Observer, screen: Screen) -> tuple[str,
     shown = next(
         (some for some in seen if some.sum() >= FEW_SEEN), on_screen & (cosine > np.cos(np.radians(CONES[-1])))
     )
-    beyond = shown & (np.einsum("ij,ij->i", rays.position - observer.position, direction) > 0.0)
-    total = float(rays.flux[shown].sum())
-    share = float(rays.flux[beyond].sum()) / total if total > 0.0 else 0.0
+    total = float(lines.flux[shown].sum())
+    share = float(lines.flux[shown & beyond].sum()) / total if total > 0.0 else 0.0
     if not share > MOST_BEYOND:
         return ()
     told = (
@@ -276,22 +319,23 @@ def beyond_notes(rays: RaySet, observer: Observer, screen: Screen) -> tuple[str,
     return (told,)
 
 
-def missed_notes(rays: RaySet, observer: Observer, screen: Screen) -> tuple[str, ...]:
+def missed_notes(rays: RaySet | Lines, observer: Observer, screen: Screen) -> tuple[str, ...]:
     """What is to be said of a screen that does not show nine tenths of the light towards its observer.
 
     Nothing from within the source: there the light comes from all sides, and no screen shows most of it.
     """
-    middle = centre_of_light(rays)
-    from_middle = lengths(rays.position - np.asarray(middle))
-    if np.linalg.norm(observer.position - np.asarray(middle)) < _quantile(from_middle, rays.flux):
-        return ()
-    light = light_towards(rays, observer, screen)
+    lines = Lines.of(rays)
+    light = light_towards(lines, observer, screen)
     if light.share(screen) >= 1.0 - MOST_MISSED:
         return ()
+    middle = centre_of_light(lines)
+    from_middle = lengths(lines.position - np.asarray(middle))
+    if np.linalg.norm(observer.position - np.asarray(middle)) < _quantile(from_middle, lines.flux):
+        return ()
     there = dataclasses.replace(observer, target=middle)
-    if not (light.flux.any() and light_towards(rays, there, screen).flux.any()):
+    if not (light.flux.any() and light_towards(lines, there, screen).flux.any()):
         return ("of the rays that were looked at none heads for the observer: from there the source is dark",)
-    whole = framed(rays, there, screen.columns, screen.rows)
+    whole = framed(lines, there, screen.columns, screen.rows)
     place = ",".join(f"{x:g}" for x in middle)
     shown = f"{light.share(screen):.1%} of the light that heads for the observer (rays within {light.cone:g}°)"
     size = f"{whole.width:g} × {whole.height:g} mm"

@@ -174,8 +174,7 @@ def where_from(rays: RayStream) -> Point:
     source, total = rays.core_source(), len(rays)
     count = min(PIECES, -(-total // PILOT_RAYS))
     places = [round(i * max(total - PILOT_RAYS, 0) / max(count - 1, 1)) for i in range(count)]
-    pieces = [_core.read_rays(source, at, min(at + PILOT_RAYS, total)) for at in places]
-    position, direction, flux = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+    position, direction, flux = _core.read_pieces(source, [(at, min(at + PILOT_RAYS, total)) for at in places])
     weight = flux if flux.any() else np.any(direction != 0.0, axis=1).astype(np.float64)
     if not weight.any():
         return (0.0, 0.0, 0.0)
