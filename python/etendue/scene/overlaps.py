@@ -288,8 +288,8 @@ def _gape(solids: _Solids, a: int, b: int, found: _Shared) -> str:
     if few or not rounded or near[len(near) // 20] > VARIED * near[len(near) // 2]:
         return ""
     return (
-        f"a film of some {near[len(near) // 2]:.2g} mm is left between them, as by a gap. If triangles stand for one curved surface "
-        f"there, give both the same 'tolerance', or let {solids.names[b]}, which is listed later, reach into "
+        f"a film of some {near[len(near) // 2]:.2g} mm is left between them, as by a gap. If triangles stand for one curved "
+        f"surface there, give both the same 'tolerance', or let {solids.names[b]}, which is listed later, reach into "
         f"{solids.names[a]}"
     )
 

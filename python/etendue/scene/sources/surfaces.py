@@ -95,10 +95,18 @@ class Surface(Source):
             raise ArgumentError(
                 "shape: this surface has no end, so its luminance would be 0; give a radius, or trim it"
             )
-        record = {"kind": "surface", "shape": sheet.shape, "trims": sheet.trims, "flip": self.side == "back"}
+        if sheet.trims:
+            kind = getattr(self.shape, "kind", "shape")
+            raise ArgumentError(
+                f"trim: a luminous {kind} cannot be cut; give the part that is left as a mesh"
+                if not self.trim.half_spaces
+                else f"trim.half_spaces: a luminous {kind} cannot be cut by them; give the part that is left as a mesh"
+            )
+        record = {"kind": "surface", "shape": sheet.shape, "flip": self.side == "back"}
         if not has_table(self):
             exponent = 1.0 if self.exponent is None else self.exponent
-            return (Emitter({**record, "exponent": exponent, "flux": self.flux}, self.flux_unit or "lm"),)
+            record.update(exponent=exponent, flux=self.flux)
+            return (Emitter(record, self.flux_unit or "lm", flux_notes=sheet.notes),)
         if sheet.shape["kind"] != "flat":
             kind = getattr(self.shape, "kind", "shape")
             raise ArgumentError(
