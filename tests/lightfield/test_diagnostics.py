@@ -25,7 +25,9 @@ from etendue.lightfield.forecast import (
     LAW_HOLDS,
     REFITS,
     Forecast,
+    _count,
     _gains,
+    _refit,
     law_of_gains,
     make_forecast,
 )
@@ -346,6 +348,42 @@ def test_forecasts_come_true(trial: Trial, curve: Forecast) -> None:
     share = math.sqrt((end - halved) / (end - scores[1]))
     low, high = (curve.factor(0.5).value / f for f in (curve.factor(0.5).high, curve.factor(0.5).low))
     assert 0.5 * low**0.5 < share < 0.5 * high**0.5, share
+
+
+def chips(n: int, seed: int) -> et.RaySet:
+    """Two Lambertian squares of 1 mm side by side, which are all edges."""
+    rng = np.random.default_rng(seed)
+    x = np.zeros((n, 3))
+    x[:, :2] = rng.random((n, 2)) - 0.5 + np.where(rng.random((n, 1)) < 0.5, [-2.0, 0.0], [2.0, 0.5])
+    sine, phi = np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
+    k = np.stack([sine * np.cos(phi), sine * np.sin(phi), np.sqrt(1 - sine**2)], axis=1)
+    return et.RaySet(x, k, np.full(n, 100.0 / n))
+
+
+@pytest.mark.slow
+def test_forecasts_of_sharp_edges_are_for_the_cells_of_the_field() -> None:
+    """The images of every rung have the cells of the field's; true gain and factor are those of fits, scored in closed form.
+
+    As fits to more rays have finer cells, they gain at least what was forecast, and need no more rays than that.
+    """
+    n, plane = 20_000, Plane(z=0, width=5, height=1.5, centre=(0, 0.25))
+    rays, fresh = chips(n, 1), chips(100_000, 2)
+    field, more = (LightField.fit(r, plane, depths=(4, 4, 3, 3)) for r in (rays, chips(4 * n, 3)))
+    few = chips(n // 8, 4)
+    (again,) = _refit(field, _count(field, few, 1, None), None).parts
+    assert again.space is not None
+    assert field.parts[0].space is not None
+    assert again.space.shape == field.parts[0].space.shape
+    # The light has the density 1/(2 π) in étendue wherever there is any.
+    even = 1e-4 / plane.parts()[0].etendue
+    lacks = [
+        -math.log(2 * math.pi) - np.log((1 - 1e-4) * f.pdf(fresh.position, fresh.direction) + even).mean()
+        for f in (field, more)
+    ]
+    true_factor = 4.0 ** (math.log(4) / math.log(lacks[0] / lacks[1]))
+    curve = make_forecast(field, rays)
+    assert curve.gain(4.0).low < lacks[0] - lacks[1]
+    assert curve.factor(0.5).low < true_factor
 
 
 @pytest.mark.slow

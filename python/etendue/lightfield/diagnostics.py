@@ -301,8 +301,8 @@ def _forecast_lines(forecast: Forecast, expected_error: float) -> list[str]:
     error, factor, gain = forecast.error(), forecast.factor(0.5), forecast.gain(4.0)
     return [
         f"relative error at a ray by fits to parts of the rays {_between(error, '{:.1%}')}, and what the grid blurs",
-        f"half of it would take {_factor(factor)} times the rays",
-        f"four times the rays would raise the score by {_between(gain, '{:.4f}')} nat per ray",
+        f"half of it would take {_factor(factor)} times the rays on the cells of this field",
+        f"four times the rays would raise the score by {_between(gain, '{:.4f}')} nat per ray, or by more on finer cells",
     ]
 
 

@@ -21,7 +21,6 @@ from etendue.lightfield.candidate import (
 )
 from etendue.lightfield.counting import EtendueCounts, FloatArray, PartGrids, count_rays
 from etendue.lightfield.etendue_density import PartField
-from etendue.lightfield.fitting import FINEST, grids_for
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.pilot_sample import pilot_sample, selected_rays
 from etendue.lightfield.symmetry import fold
@@ -167,7 +166,8 @@ def make_forecast(
 ) -> Forecast:
     """Fit the field again to an eighth, a quarter and half of its rays, and judge each fit on the other half.
 
-    Surface, grid, symmetry, base measure and concentrations stay as they are.
+    Surface, grid, the cells of the images, symmetry, base measure and concentrations stay as they are. A fit of more rays
+    may have finer cells, which gain something as well: the forecast is what more rays bring at least.
 
     Parameters
     ----------
@@ -245,15 +245,20 @@ def law_of_gains(rays: FloatArray, gains: FloatArray, covariance: npt.NDArray[np
 
 
 def _count(field: LightField, rays: RaySet, seed: int, threads: int | None) -> EtendueCounts:
-    """The rays in the cells of the field."""
+    """The rays in the cells of the field, those of its images among them.
 
-    def grids_of(part: PartField) -> PartGrids:
-        s1, s2, a, b = (n.bit_length() - 1 for n in part.ratio.shape)
-        finest = FINEST if part.space is None else max(FINEST, len(part.space).bit_length() - 1)
-        return grids_for(len(rays), (s1, s2, a, b), finest)
-
-    grids = [grids_of(part) for part in field.parts]
+    A fit of fewer rays would have coarser images: at four times fewer, so that of two rungs with twice the rays the first
+    would gain what cells of half the size do, and the second nothing, or the other way round.
+    """
+    grids = [_grids_of(part) for part in field.parts]
     return count_rays(rays, field.surface, grids, held_out=0.0, seed=seed, threads=threads)
+
+
+def _grids_of(part: PartField) -> PartGrids:
+    """The grids that a part of a field was made on; where it has no images, the coarsest that go with its cells."""
+    s1, s2, a, b = (n.bit_length() - 1 for n in part.ratio.shape)
+    place, direction = (0 if f is None else len(f).bit_length() - 1 for f in (part.space, part.direction))
+    return PartGrids((s1, s2, a, b), (max(place, s1, s2), max(direction, a, b)))
 
 
 def _refit(field: LightField, counts: EtendueCounts, threads: int | None) -> LightField:
