@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import etendue as et
 import numpy as np
@@ -190,3 +191,17 @@ def test_spots_finer_than_the_cells_that_are_asked_for_are_lost() -> None:
         for side in (None, 0.8)
     ]
     assert shown[0] > 0.5 > shown[1]
+
+
+@pytest.mark.slow
+def test_a_field_a_file_of_it_and_its_diagnostics_state_the_same(tmp_path: Path) -> None:
+    """A last digit of an image would change which rays are drawn, and the pitch by a tenth."""
+    field = et.LightField.fit(spotted(pitch=None, seed=21, rays=2000), PLANE, depths=(2, 2, 2, 2))
+    path = tmp_path / "field.h5"
+    field.save(path)
+    stated, loaded = field.resolution(), et.LightField.load(path)
+    assert loaded.parts[0].space is not None
+    assert not np.array_equal(loaded.parts[0].space, field.parts[0].space)
+    assert loaded.resolution() == stated
+    assert field.resolution(seed=2) != stated
+    assert et.diagnose(loaded, seed=2).resolution == stated

@@ -222,7 +222,8 @@ def diagnose(
         spots=tuple(_spots(field, losses, spots)),
         forecast=forecast,
         source=field.provenance.source,
-        resolution=field.resolution(seed=seed, threads=threads),
+        # By its own seed: what else is said of this field states the same.
+        resolution=field.resolution(threads=threads),
     )
 
 

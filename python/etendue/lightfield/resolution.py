@@ -14,6 +14,7 @@ from etendue.lightfield.counting import FloatArray, PartCounts, Sums
 from etendue.lightfield.etendue_density import EtendueDensity
 from etendue.lightfield.marginals import marginals
 from etendue.lightfield.nodes import node_values
+from etendue.lightfield.storage import rounded_part
 from etendue.lightfield.symmetry import sum_of_images
 from etendue.quantities.powers_of_ten import rounded
 from etendue.quantities.ray_stream import checked_seed, checked_threads
@@ -127,7 +128,8 @@ def resolution(field: EtendueDensity, *, seed: int = 1, threads: int | None = No
     threads, seed = checked_threads(threads), checked_seed(seed)
     charts, fluxes = field.surface.parts(), field.part_flux
     index = int(np.argmax(fluxes))
-    chart, part, report = charts[index], field.parts[index], field.report
+    # As a file holds it: counts that are drawn from a field and from the same one loaded are the same, bit by bit.
+    chart, part, report = charts[index], rounded_part(field.parts[index]), field.report
     symmetry = report.symmetry
     rays = report.effective_rays if math.isfinite(report.effective_rays) else float(report.rays - report.unmet_rays)
     own = max(rays * fluxes[index] / field.total_flux, 1.0)

@@ -128,7 +128,7 @@ def load_field(path: Path) -> EtendueDensity:
 
 def as_stored(field: Density) -> Density:
     """The field as a file holds it: rounded to what it is worth, each part with exactly the flux it had."""
-    parts = tuple(_rounded_part(part) for part in field.parts)
+    parts = tuple(rounded_part(part) for part in field.parts)
     flux = field.replace(parts=parts).part_flux
     levels = (
         part.level * (had / has) if has > 0 else part.level
@@ -139,7 +139,16 @@ def as_stored(field: Density) -> Density:
     )
 
 
-def _rounded_part(part: PartField) -> PartField:
+def rounded_part(part: PartField) -> PartField:
+    """A part with its numbers rounded to what they are worth; one that is rounded stays as it is.
+
+    Examples
+    --------
+    >>> third = np.full((1, 1, 1, 1), 1 / 3, dtype=np.float32)
+    >>> part = rounded_part(PartField(third, third / 10, np.full((1, 1), 1 / 3), None, 1.0))
+    >>> part.ratio.item(), part.space.item(), rounded_part(part).ratio.item()
+    (0.333984375, 0.333251953125, 0.333984375)
+    """
     ratio, deviation = (np.asarray(values, dtype=np.float32) for values in (part.ratio, part.deviation))
     deviation = rounded(deviation, DEVIATION_DIGITS)
     ratio = rounded(ratio, digits_for(ratio, deviation / np.float32(STEPS), FEWEST_DIGITS))
