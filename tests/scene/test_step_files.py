@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 from pathlib import Path
 from typing import Any
 
 import etendue as et
 import numpy as np
 import pytest
-from etendue.errors import SceneError
+from etendue.errors import FormatError, SceneError
 from etendue.quantities.luminance_map import LuminanceMap
-from etendue.scene import Scene, compile_scene
+from etendue.scene import Scene, compile_scene, open_cascade_process
 from etendue.scene.mesh_files import read_mesh, step_bodies
 from etendue.scene.step_files import read_step
 from oracles import step
@@ -216,3 +217,37 @@ def test_flat_triangles_of_a_curved_glass_body_are_told() -> None:
     assert "crease_angle = 30" in note
     for solid in ({"shape": ball, "medium": "BK7"}, {"shape": flat, "finish": "absorber"}):
         assert not compile_scene(Scene(solids=[solid])).notes
+
+
+# --- files that are damaged -------------------------------------------------------------------------------------------
+
+
+def test_a_file_that_is_cut_off_is_told_with_its_line_and_nothing_is_printed(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The library prints what it thinks of a file, which would stand in JSON."""
+    text = step.half_ball(10.0)
+    with pytest.raises(FormatError, match=r"holds no surface that can be read \(Line \d+: .*unexpected end of file.*\)"):
+        read_step(tmp_path, text[: len(text) // 2].encode(), None)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_file_that_crashes_the_library_leaves_this_process_alone(tmp_path: Path) -> None:
+    """An edge that is the edge of itself: the library follows it until its stack ends."""
+    text, count = re.subn(
+        r"#(\d+)=ORIENTED_EDGE\('',\*,\*,#\d+,", r"#\1=ORIENTED_EDGE('',*,*,#\1,", step.half_ball(10.0)
+    )
+    assert count == 2
+    with pytest.raises(FormatError, match=r"Open CASCADE, which reads it, breaks off|holds no surface|no triangles"):
+        read_step(tmp_path, text.encode(), None)
+
+
+def test_what_the_library_said_before_it_broke_off_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process that takes a part of the file, complains and is gone, whatever else it is sent."""
+    program = tmp_path / "ends.py"
+    program.write_text(
+        "import sys; sys.stdin.buffer.read(8); sys.stderr.write('**** ERR StepFile : no room ****'); exit(3)"
+    )
+    monkeypatch.setattr(open_cascade_process, "__file__", str(program))
+    with pytest.raises(FormatError, match=r"which reads it, breaks off \(no room\)\. The file is damaged"):
+        read_step(tmp_path, step.half_ball(10.0).encode() + bytes(1 << 22), None)

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import FormatError, UnknownNameError
-from etendue.extras import require
+from etendue.scene.open_cascade import OpenCascade
 from etendue.scene.triangles import as_written, chord_error, open_edges, smooth_where_round, volume, welded
 from etendue.units import MM_PER_LENGTH_UNIT
 
@@ -108,8 +108,8 @@ def read_step(path: Path, raw: bytes, tolerance: float | None, name: str | None 
     MissingLibraryError
         If the library is not installed.
     FormatError
-        If the file is damaged or has no body of that name, or the tolerance asks for more
-        than `MOST_TRIANGLES`.
+        If the file is damaged, so that Open CASCADE cannot read it or crashes, or has no body of that name, or the
+        tolerance asks for more than `MOST_TRIANGLES`.
 
     Examples
     --------
@@ -121,7 +121,12 @@ def read_step(path: Path, raw: bytes, tolerance: float | None, name: str | None 
     cut.step
     """
     names = _Names(raw.decode("latin-1"))
-    first = _bodies(path, _meshed(path, raw, FIRST_LOOK, COARSE_TURN, relative=True), names)
+    with OpenCascade(path, raw) as reader:
+        return _read(path, reader, names, tolerance, name)
+
+
+def _read(path: Path, reader: OpenCascade, names: _Names, tolerance: float | None, name: str | None) -> list[StepBody]:
+    first = _bodies(path, reader.triangles(FIRST_LOOK, COARSE_TURN, relative=True), names)
     if name is not None and name not in [body.name for body in first]:
         error = UnknownNameError("body", name, [body.name for body in first])
         raise FormatError(path, "body", str(error), "")
@@ -138,24 +143,11 @@ def read_step(path: Path, raw: bytes, tolerance: float | None, name: str | None 
             f"{tolerance:.3g} mm would take about {needed:.2g} triangles, and {MOST_TRIANGLES:,} is the most",
             "Give a larger 'tolerance'.",
         )
-    found = _bodies(path, _meshed(path, raw, tolerance, turn), names)
+    found = _bodies(path, reader.triangles(tolerance, turn), names)
     if [body.name for body in found] != [body.name for body in first]:
         text = "its faces do not close in the same way when its triangles are finer"
         raise FormatError(path, "bodies", text, "Repair the bodies where they were drawn, and export them anew.")
     return [body for body in found if name in (None, body.name)]
-
-
-def _meshed(path: Path, raw: bytes, tolerance: float, turn: float, *, relative: bool = False) -> bytes:
-    cascadio = require("cascadio")
-    try:
-        made: bytes = cascadio.load(
-            raw, tol_linear=tolerance, tol_angular=turn, tol_relative=relative, include_brep=True
-        )
-    except Exception as error:  # noqa: BLE001 - whatever a damaged file makes the library raise
-        raise FormatError(path, "STEP", f"cannot be read ({error})", "The file is damaged, or no mesh.") from None
-    if not made:
-        raise FormatError(path, "STEP", "holds no surface that can be read", "Export the bodies as solids.")
-    return made
 
 
 # --- what the library gives: binary glTF -----------------------------------------------------------------------------
