@@ -21,8 +21,6 @@ from etendue.quantities.polar_grid import PolarGrid
 
 Array = npt.NDArray[np.float64]
 
-KEYWORDS = ("Source", "Symmetry", "SpectralContent", "ScatterType", "SampleRotation", "AngleOfIncidence", "ScatterAzimuth",
-            "ScatterRadial")  # fmt: skip
 SYMMETRIES = ("PlaneSymmetrical", "Asymmetrical", "ASymmetrical4D")
 CHANNELS = ("TristimulusX", "TristimulusY", "TristimulusZ")
 
