@@ -43,7 +43,7 @@ class OpenCascade:
     >>> with OpenCascade(Path("cut.step"), b"ISO-10303-21;HEADER;") as reader:
     ...     reader.triangles(0.1, 0.5)
     Traceback (most recent call last):
-    etendue.errors.FormatError: cut.step: STEP: holds no surface that can be read (... Line 1: ...)...
+    etendue.errors.FormatError: cut.step: STEP: holds no surface that can be read (Line ...). Export ...
     """
 
     def __init__(self, path: Path, raw: bytes) -> None:
