@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
+from typing import Any
 
 import etendue as et
 import numpy as np
@@ -188,3 +190,20 @@ def test_a_notebook_shows_the_same_page(files: Path) -> None:
     assert widget.page == run_file.read_text("utf-8")
     named = et.view(et.read_map(files / "map.exr"))
     assert named.page.startswith("<!doctype html>")
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        (
+            {"source": 3},
+            "view: source is 3; give a light field, rays, a map, the result of a trace, a scene, or the path",
+        ),
+        ({"title": 3}, "view: title is 3; give the title of the page, or None"),
+        ({"height": "tall"}, "view: height is 'tall'; give a number of CSS pixels"),
+    ],
+)
+def test_a_notebook_is_told_what_cannot_be_shown(keys: dict[str, Any], words: str) -> None:
+    whole: dict[str, Any] = {"source": et.IlluminanceMap([[5.0]], [[0.1]], [[9]], et.Screen(2, 1, 1, 1, "xy")), **keys}
+    with pytest.raises(ArgumentError, match=re.escape(words)):
+        et.view(whole.pop("source"), **whole)

@@ -6,9 +6,10 @@ import functools
 import os
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from etendue.extras import require
+from etendue.quantities import arguments
 from etendue.viewer.bundle import PACKAGE, page_html
 from etendue.viewer.opening import Viewable, exhibit_of, open_viewable
 
@@ -69,6 +70,15 @@ def view(
     >>> widget.title, widget.page.startswith("<!doctype html>")
     ('rings', True)
     """
+    arguments.require(
+        source,
+        (str, os.PathLike, *get_args(Viewable)),
+        "view: source",
+        "a light field, rays, a map, the result of a trace, a scene, or the path of one of them",
+    )
+    if title is not None:
+        arguments.require(title, str, "view: title", "the title of the page, or None")
+    arguments.require_number(height, "view: height", "a number of CSS pixels")
     require("anywidget")
     if isinstance(source, str | os.PathLike):
         path = Path(source)
@@ -81,7 +91,7 @@ def view(
     exhibit = exhibit_of(
         viewable, name=name, file=file, detector=detector, rays=rays, seed=seed, cache=cache, threads=threads
     )
-    return _widget()(page=page_html(exhibit.subject), title=name, height=height)
+    return _widget()(page=page_html(exhibit.subject), title=name, height=int(height))
 
 
 def _name(source: Any) -> str:
