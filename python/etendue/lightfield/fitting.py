@@ -27,7 +27,7 @@ from etendue.lightfield.candidate import (
 )
 from etendue.lightfield.carrier import Plane, Surface
 from etendue.lightfield.close_lines import TOLD, blurred_share, crowding, told_of_blur
-from etendue.lightfield.counting import DEEPEST, Depths, EtendueCounts, FloatArray, PartGrids, count_rays
+from etendue.lightfield.counting import Depths, EtendueCounts, FloatArray, PartGrids, count_rays
 from etendue.lightfield.etendue_density import EtendueDensity, FitReport
 from etendue.lightfield.expected_loss import loss_of_gamma
 from etendue.lightfield.fit_progress import FitProgress, Step
@@ -176,11 +176,12 @@ def fit_light_field(
 
 def _checked_depths(given: Depths) -> Depths:
     """Four whole numbers, as a tuple of Python's own."""
-    what, wanted = "LightField.fit: depths", f"four whole numbers from 0 to {DEEPEST}, or None"
+    # The images have as many halvings at least, along both of their sides.
+    what, wanted = "LightField.fit: depths", f"four whole numbers from 0 to {MOST_FINEST}, or None"
     shape = as_numbers(given, what, wanted).shape
     if shape != (4,):
         raise ArgumentError(f"{what} has shape {shape}; give {wanted}.")
-    s1, s2, a, b = (as_whole(one, f"{what}: one of them", 0, DEEPEST) for one in given)
+    s1, s2, a, b = (as_whole(one, f"{what}: one of them", 0, MOST_FINEST) for one in given)
     return s1, s2, a, b
 
 

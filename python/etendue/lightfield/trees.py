@@ -68,8 +68,15 @@ class Base:
         return "uniform" if self.space is None and self.direction is None else "product"
 
     def masses(self, shape: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
-        """Mass of the coarse cells over place and over direction; each adds up to one."""
-        return _coarse(self.space, shape[:2]), _coarse(self.direction, shape[2:])
+        """Mass of the coarse cells over place and over direction; each adds up to one. A grid of two axes has one direction.
+
+        Examples
+        --------
+        >>> place, direction = Base().masses((2, 2))
+        >>> place.tolist(), direction.tolist()
+        ([[0.25, 0.25], [0.25, 0.25]], [[1.0]])
+        """
+        return _coarse(self.space, shape[:2]), _coarse(self.direction, shape[2:] or (1, 1))
 
     def cells(self, shape: tuple[int, ...]) -> FloatArray:
         """Mass of every coarse cell; all together one."""
