@@ -16,6 +16,7 @@ from etendue.lightfield.storage import as_stored
 from etendue.luminance.source_report import SourceReport
 from etendue.plot.report_page import A4, MARGIN, PAGE_TYPES, report_html
 from etendue.quantities.measured import measured
+from etendue.quantities.powers_of_ten import counted
 
 OBSERVERS = [et.Observer(10, 20, 800, target=(3, -2, 1)), et.Observer(50, 200, 800, target=(3, -2, 1))]
 
@@ -63,7 +64,7 @@ def test_the_figures_are_those_of_single_calls(report: SourceReport, file: Path)
         brightest = np.unravel_index(alone.values.argmax(), alone.values.shape)
         said = dict(row)
         assert said["largest pixel"] == measured(alone.values[brightest], alone.standard_error[brightest], "cd/m²")
-        assert said["intensity"] == f"{alone.intensity:.4g} cd"
+        assert said["intensity"] == counted(alone.intensity, "cd")
         assert alone.relative_error is not None
         assert said["error, weighted by flux"] == f"{alone.relative_error.flux_weighted:.2%}"
     np.testing.assert_array_equal(report.intensity.values, field.intensity().values)
@@ -119,6 +120,27 @@ def test_the_page_of_paper_is_whole(report: SourceReport, *, crowded: bool) -> N
     # Facts of two lines, complaints of three, in rooms of 20 and 6 lines; 12 views in a table of six.
     assert left_out == ([20, 18, 6] if crowded else [])
     assert "signature" in words
+
+
+@pytest.mark.slow
+def test_the_page_of_paper_tells_what_is_wrong_with_the_light(report: SourceReport) -> None:
+    """Notes stand beside the facts: warnings before how the surface was chosen, as many as there is room for."""
+    warning = "luminances in the beam are off by much more than their errors"
+    choice = ("carrier surface plane:z=0: the simplest", "depths between -1 and 1 mm cannot be told")
+
+    def words(*notes: str, facts: int) -> str:
+        rows = tuple((f"fact {n}", "a fact") for n in range(facts))
+        figure = et.plot_report(dataclasses.replace(report, facts=rows, notes=notes))
+        return " ".join(text.get_text() for text in figure.texts)
+
+    whole = words(*choice, warning, facts=20)
+    assert all(note in " ".join(whole.split()) for note in (*choice, warning))
+    assert whole.index("off by much more") < whole.index("carrier surface")
+    short = words(*choice, f"{warning}: {'many words ' * 90}", facts=18)
+    assert warning in " ".join(short.split())
+    assert "…" in short
+    assert "and 2 more: see the page of HTML" in short
+    assert "notes: 3, in the page of HTML" in words(*choice, warning, facts=3)
 
 
 @pytest.mark.slow

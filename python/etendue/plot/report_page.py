@@ -43,8 +43,11 @@ SIDE = 1.42
 MOST_VIEWS = 4
 """Maps on the page; the others stand in its table only."""
 
-FACT_LINES, COMPLAINT_LINES = 20, 6
+FACT_LINES, COMPLAINT_LINES, NOTE_LINES = 20, 6, 5
 """Room for the facts and the complaints; a page of HTML has them all."""
+
+OF_SURFACE = ("carrier surface", "depths between")
+"""How notes begin that tell how the surface of the light field was chosen."""
 
 MOST_ROWS = 6
 """Of the table of views."""
@@ -110,7 +113,8 @@ def plot_report(report: SourceReport, path: str | os.PathLike[str] | None = None
     title = style.shortened(report.title, int(room / style.width_of("0", 1.15 * HEADING)))
     style.add_text(figure, MARGIN, y, title, size=HEADING, color=style.INK, weight="bold")
     style.add_text(figure, A4[0] - MARGIN, y, report.subtitle, size=style.LABEL_SIZE, color=style.FAINT, ha="right")
-    y = min(_write_facts(figure, report, y - 0.3), _write_words(figure, report, y - 0.3)) - 0.2
+    foot = _write_facts(figure, report, y - 0.3)
+    y = min(foot, _write_words(figure, report, y - 0.3, foot)) - 0.2
     y = _draw_maps(figure, report, y)
     y = _write_views(figure, report, y)
     _draw_intensity(figure, report, y)
@@ -146,8 +150,8 @@ def _write_facts(figure: Figure, report: SourceReport, y: float) -> float:
     return _lines(figure, MARGIN, y, _rest(len(rows) - shown), style.FAINT)
 
 
-def _write_words(figure: Figure, report: SourceReport, y: float) -> float:
-    """Complaints, and what the field resolves, on the right half."""
+def _write_words(figure: Figure, report: SourceReport, y: float, foot: float) -> float:
+    """Complaints, what the field resolves, and as many notes as have room beside the facts, on the right half."""
     x, wide = A4[0] / 2 + 0.2, A4[0] / 2 - MARGIN - 0.2
     y = _heading(figure, x, y, "Complaints" if report.complaints else "Complaints: none")
     wrapped = [style.wrapped([line], wide)[:3] for line in report.complaints]
@@ -160,7 +164,30 @@ def _write_words(figure: Figure, report: SourceReport, y: float) -> float:
         # What only those ask for who know the estimator stands in the page of HTML.
         if "nat per ray" not in line and "degrees of freedom" not in line:
             y = _lines(figure, x, y, style.wrapped([line], wide))
+    room = int((y - foot) / LINE) - 2
+    # What may be wrong with the light goes first.
+    ordered = sorted(report.notes, key=lambda note: note.startswith(OF_SURFACE))
+    # Where some are left out, a line says so.
+    notes = [_cut(style.wrapped([note], wide), min(NOTE_LINES, max(room - 1, 1))) for note in ordered]
+    lengths = [len(lines) for lines in notes]
+    shown = len(notes) if sum(lengths) <= room else _that_fit(lengths, room - 1)
+    if not shown and notes:
+        y = _lines(figure, x, y - 0.5 * LINE, [f"notes: {len(notes)}, in the page of HTML"], style.FAINT)
+    if shown:
+        y = _heading(figure, x, y - 0.5 * LINE, "Notes")
+        for lines in notes[:shown]:
+            y = _lines(figure, x, y, lines)
+        y = _lines(figure, x, y, _rest(len(notes) - shown), style.FAINT)
     return y
+
+
+def _cut(lines: Sequence[str], most: int) -> list[str]:
+    """The first lines of a note, and dots if there are more.
+
+    >>> _cut(["one", "two", "three"], 2), _cut(["word"], 2)
+    (['one', 'two …'], ['word'])
+    """
+    return list(lines) if len(lines) <= most else [*lines[: most - 1], f"{lines[most - 1]} …"]
 
 
 def _that_fit(lengths: Sequence[int], room: int) -> int:
