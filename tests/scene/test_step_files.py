@@ -227,7 +227,9 @@ def test_a_file_that_is_cut_off_is_told_with_its_line_and_nothing_is_printed(
 ) -> None:
     """The library prints what it thinks of a file, which would stand in JSON."""
     text = step.half_ball(10.0)
-    with pytest.raises(FormatError, match=r"holds no surface that can be read \(Line \d+: .*unexpected end of file.*\)"):
+    with pytest.raises(
+        FormatError, match=r"holds no surface that can be read \(Line \d+: .*unexpected end of file.*\)"
+    ):
         read_step(tmp_path, text[: len(text) // 2].encode(), None)
     assert capfd.readouterr() == ("", "")
 
