@@ -44,7 +44,8 @@ def test_what_is_seen_from_everywhere_is_the_flux() -> None:
     """V12: Σ L A⊥ of a map is the intensity of its view, ∫ I dω = ∫∫ L dU the flux that leaves.
 
     Views are drawn around each node of the far field of a trace, by its hat, more of them where there is more light; their
-    spread is the error of their mean.
+    spread is the error of their mean. One view of four has rays forwards, which cost more than its lines of sight and take
+    next to nothing from that spread: to the total error, 5 % of the flux, it makes no difference.
     """
     scene = lantern()
     result = et.trace(scene, 4e5, 3)
@@ -64,7 +65,10 @@ def test_what_is_seen_from_everywhere_is_the_flux() -> None:
         for theta, phi in zip(thetas, phis, strict=True):
             seed += 1
             view = et.Observer(theta, phi, 1e7)
-            seen.append(et.luminance_map(scene, view, screen, rays_per_pixel=8, seed=seed).intensity)
+            forward = None if seed % 4 == 0 else 0
+            seen.append(
+                et.luminance_map(scene, view, screen, rays_per_pixel=8, seed=seed, forward_rays=forward).intensity
+            )
         error = np.std(seen, ddof=1) / math.sqrt(count)
         cells.append((float(np.mean(seen)) - far.values[i, j], math.hypot(error, far.standard_error[i, j]), solid,
                       float(np.mean(seen)), count - 1.0))  # fmt: skip
