@@ -57,7 +57,7 @@ def test_numbers_of_single_precision_are_those_that_were_written(scale: float) -
 def test_a_body_of_single_precision_touches_the_exact_one_below(tmp_path: Path) -> None:
     """Two plates of one index on each other: of a beam along the normal (1 - R)/(1 + R) passes, R = (n - 1)²/(n + 1)².
 
-    Single precision holds 3.7 mm, where they touch, as 3.70000005 mm. A film of air between them would let (1 - R)/(1 + 3 R) pass.
+    Single precision holds 3.7 mm, where they touch, as 3.70000005 mm; a film of air would let (1 - R)/(1 + 3 R) pass.
     """
     (tmp_path / "plate.stl").write_bytes(stl(plate(3.7, 1.6), TRIANGLES))
     rays, reflected = 20_000, 1.0 / 9.0
