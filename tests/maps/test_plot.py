@@ -403,3 +403,17 @@ def test_comparison_shows_both_maps_alike_and_where_they_differ(tmp_path: Path) 
     assert "Mine against theirs" in text
     with pytest.raises(UnknownNameError):
         plot_comparison(result, scale="logarithmic")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("rows", [1, 2, 12, 60])
+def test_numbers_beside_a_flat_map_do_not_run_into_each_other(rows: int) -> None:
+    """A map of 60 columns and of few rows is a strip."""
+    ones = np.ones((rows, 60))
+    flat = LuminanceMap(ones, ones, ones.astype(int), Observer(0, 0, 100), Screen(10, rows / 6, 60, rows))
+    figure = plot_map(flat)
+    figure.canvas.draw()
+    shown = [label.get_window_extent() for label in figure.axes[0].get_yticklabels() if label.get_text()]
+    low, high = figure.axes[0].get_window_extent().intervaly
+    shown = sorted((box for box in shown if low <= (box.y0 + box.y1) / 2 <= high), key=lambda box: box.y0)
+    assert shown
+    assert all(below.y1 <= above.y0 for below, above in itertools.pairwise(shown))

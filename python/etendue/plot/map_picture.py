@@ -273,9 +273,14 @@ def draw_screen(
         axis.set_major_locator(style.locator_for(length))
         if axis is axes.xaxis:
             style.keep_apart(axis, length, -size / 2, size / 2)
+        elif length < THREE_LINES:  # three numbers are the fewest that are asked for
+            axis.set_ticks([0.0])
         style.put_numbers(axis, name if length >= NARROW else name.split()[0], "mm", -size / 2, size / 2)
     return image
 
+
+THREE_LINES = 0.42
+"""Height of three numbers one over the other [inches]."""
 
 LYING = 2.0
 """Width over height of a picture above which its colour bar lies under it."""
