@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from pathlib import Path
 
 import etendue as et
@@ -272,6 +273,36 @@ def test_light_towards_minus_z_gets_a_closed_surface_and_a_hint() -> None:
     assert choice.depths is None
     assert choice.table[0].unmet < 0.01
     assert any("rays.rotated" in note for note in choice.notes)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("back", [0.0, 30.0])
+def test_a_panel_aslant_is_said_to_be_sharper_when_turned(back: float) -> None:
+    """Of 2 mm × 1 mm, its normal 40° from +Z: told exactly where rays start on it, and where not by their mean direction.
+
+    Turned as is said, its rays are predicted better; where the angle is exact, by the rectangle that it is. An upright one
+    gets no such hint.
+    """
+    rng = np.random.default_rng(8)
+    turn, sine = 2 * np.pi * rng.random(4000), np.sqrt(rng.random(4000))
+    k = np.stack([sine * np.cos(turn), sine * np.sin(turn), np.sqrt(1 - sine**2)], axis=1)
+    position = np.column_stack([rng.uniform(-1, 1, (4000, 2)) * [1.0, 0.5], np.full(4000, 0.3)])
+    upright = rays_of(position - back * k, k)
+    aslant = upright.rotated((0, 1, 0), 40)
+    assert not any("rays.rotated" in note for note in choose_surface(upright, settings=QUICK).notes)
+    choice = choose_surface(aslant, settings=QUICK)
+    assert not isinstance(choice.surface, Plane | Disk | Hemisphere | Dome)
+    (hint,) = (note for note in choice.notes if "rays.rotated" in note)
+    assert "a plane predicts rays held out of the fit better by" in hint
+    numbers = re.search(r"rays\.rotated\(\((.*), (.*), (.*)\), (.*)\)\),", hint)
+    assert numbers is not None
+    *axis, angle = map(float, numbers.groups())
+    assert angle == pytest.approx(40.0, abs=3.0 if back else 1e-4)
+    turned = choose_surface(aslant.rotated(axis, angle), settings=QUICK)
+    assert turned.table[0].score > choice.table[0].score + 0.02
+    if not back:
+        assert isinstance(turned.surface, Plane)
+        assert (turned.surface.width, turned.surface.height) == pytest.approx((2.0, 1.0), rel=2e-3)
 
 
 @pytest.mark.slow

@@ -10,10 +10,11 @@ import numpy as np
 
 from etendue.concurrency import on_one_blas_thread
 from etendue.errors import ArgumentError
-from etendue.lightfield.carrier import Disk, Dome, Plane, Surface
+from etendue.lightfield.carrier import Disk, Dome, Hemisphere, Plane, Surface
 from etendue.lightfield.carrier.sizing import SLACK
 from etendue.lightfield.focusing import focused_about
 from etendue.lightfield.pilot_sample import FEWEST, even_density, pilot_sample
+from etendue.lightfield.selection.front import Turn, mean_direction, start_normal, turn_upright
 from etendue.lightfield.selection.line_search import golden_section, round_numbers_near
 from etendue.lightfield.selection.scorer import WITH_IMAGES, HeldOutScore, SurfaceScorer
 from etendue.lightfield.selection.settings import DEFAULT, Grid, SelectionSettings
@@ -103,7 +104,8 @@ def choose_surface(
     A field of up to 2¹⁶ cells per part, on a uniform base, is fitted to four fifths of some 130 thousand rays and scored on
     the others; see `SurfaceScorer`. A surface replaces a simpler one if it leads by three standard errors of the difference.
     None is chosen that leaves more than a hundredth of the flux unmet, beside that of strays far off. If the field then
-    turns out to blur where some of the light comes from, `LightField.fit` tries the next ones.
+    turns out to blur where some of the light comes from, `LightField.fit` tries the next ones. Of a source that looks aside
+    a note tells by how much a flat surface would be better, were the rays turned.
 
     Parameters
     ----------
@@ -299,14 +301,49 @@ class _Search:
         if depths is not None and isinstance(winner.surface, Plane | Disk | Dome):
             low, high = told_apart(*depths)
             yield f"depths between {low} and {high} mm cannot be told from that of {winner.surface.told}"
-        mean = np.average(self.trials.direction, weights=self.trials.rays.flux, axis=0)
-        aslant = self.settings.aslant
-        if np.linalg.norm(mean) > aslant and mean[2] < aslant * np.linalg.norm(mean):
-            x, y, z = mean / np.linalg.norm(mean)
+        yield from self.notes_of_front(winner)
+
+    def notes_of_front(self, winner: _Scored) -> Iterator[str]:
+        """What is to be said of a source that looks aside: whether it would be sharper on a flat surface of its own."""
+        trials, aslant = self.trials, self.settings.aslant
+        mean = mean_direction(trials.direction, trials.rays.flux)
+        length = float(np.linalg.norm(mean))
+        if length <= aslant:
+            return
+        normal = start_normal(trials.position, mean)
+        flat = isinstance(winner.surface, Plane | Disk | Hemisphere | Dome)
+        front = normal if normal is not None else mean / length
+        turn = turn_upright(front)
+        towards = "({:.2f}, {:.2f}, {:.2f})".format(*(front + 0.0))
+        if turn.angle > self.settings.least_tilt and (normal is not None or not flat):
+            turned = self.flat_when(turn)
+            if turned is not None and turned.held_out.leads(winner.held_out, self.settings):
+                lead, error = turned.held_out.score.lead(winner.held_out.score)
+                yield (
+                    f"the source looks towards {towards}: turned so that it looks towards +Z (in Python, {turn.told}), a "
+                    f"{turned.surface.NAME} predicts rays held out of the fit better by {lead:.4f} ± {error:.4f}; a light "
+                    "field of the turned rays is sharper"
+                )
+                return
+        if mean[2] < aslant * length:
             yield (
-                f"the light heads towards ({x:.2f}, {y:.2f}, {z:.2f}) on average; planes, disks, hemispheres and domes "
+                f"the light heads towards {towards} on average; planes, disks, hemispheres and domes "
                 "shine towards +Z: if one of these would suit the source, turn the rays (in Python, rays.rotated)"
             )
+
+    def flat_when(self, turn: Turn) -> _Scored | None:
+        """The best rectangle or disk of the turned rays, scored on the same ones as the surfaces of these; None if none is.
+
+        Nothing that is compared changes where everything is turned: neither densities in étendue nor who is held out.
+        """
+        search = _Search(self.rays.rotated(*turn), self.trials.seed, self.scorer.threads, self.settings, self.step)
+        if np.count_nonzero(search.trials.up) < FEWEST:
+            return None
+        z, _ = search.depth()
+        flats = search.trials.flats(z)
+        kinds = [[s for s in flats if isinstance(s, kind)] for kind in (Plane, Disk)]
+        found = [f for f in search.finals([search.best(k) for k in kinds]) if f.held_out.unmet <= search.most_unmet]
+        return max(found, key=lambda f: f.mean, default=None)
 
 
 def told_apart(low: float, high: float) -> tuple[str, str]:

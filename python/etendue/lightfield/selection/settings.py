@@ -109,6 +109,7 @@ class SelectionSettings:
     depth_tolerance: float = 0.01
     most_backwards: float = 0.5
     aslant: float = 0.3
+    least_tilt: float = 1.0
 
     def coarser(self, rays: int) -> int:
         """Halvings of each coordinate that are left out where so many rays are compared; see `fine_grids_from`.
