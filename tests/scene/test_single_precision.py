@@ -90,7 +90,9 @@ def test_a_film_that_nobody_makes_is_told(gap: float) -> None:
     assert words.startswith('"below" and "above" touch but for a film ')
     # The median of lines in all directions, 1/cos 60° times as long as that along the normal.
     assert float(words.rpartition(" ")[2]) == pytest.approx(2.0 * gap, rel=0.5)
-    assert 'let "above", which is listed later, reach a little into "below"' in rest
+    assert (
+        'let "above", which is listed later, reach a little into "below": that they overlap then does no harm' in rest
+    )
     dark = {"finish": "absorber", **TURN}
     assert told({**below, **dark}, {"name": "above", "shape": shape, **dark}) == []
 

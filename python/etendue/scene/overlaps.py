@@ -272,7 +272,7 @@ def _film(solids: _Solids, a: int, b: int, found: _Shared) -> Iterator[str]:
         yield (
             f"{names[a]} and {names[b]} touch but for a film {found.films[where]:.2g} mm thick, as at "
             f"{_place(found.places[where])}: light is refracted and reflected on both its sides, as by a gap; let "
-            f"{names[b]}, which is listed later, reach a little into {names[a]}"
+            f"{names[b]}, which is listed later, reach a little into {names[a]}: that they overlap then does no harm"
         )
     elif gape := _gape(solids, a, b, found):
         yield f"{names[a]} and {names[b]} do not touch everywhere: {gape}"
