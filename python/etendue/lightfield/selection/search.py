@@ -103,9 +103,9 @@ def choose_surface(
 
     A field of up to 2¹⁶ cells per part, on a uniform base, is fitted to four fifths of some 130 thousand rays and scored on
     the others; see `SurfaceScorer`. A surface replaces a simpler one if it leads by three standard errors of the difference.
-    None is chosen that leaves more than a hundredth of the flux unmet, beside that of strays far off. If the field then
-    turns out to blur where some of the light comes from, `LightField.fit` tries the next ones. Of a source that looks aside
-    a note tells by how much a flat surface would be better, were the rays turned.
+    None is chosen that leaves more than a hundredth of the flux unmet, beside that of strays far off, which may be as much
+    again, unless all do. If the field then turns out to blur where some of the light comes from, `LightField.fit` tries the
+    next ones. Of a source that looks aside a note tells by how much a flat surface would be better, were the rays turned.
 
     Parameters
     ----------
@@ -167,7 +167,9 @@ class _Search:
         few = pilot_sample(rays, settings.search_rays)
         self.coarse_scorer = SurfaceScorer.of(few, even, seed, threads, settings.search_one_fold_from, settings)
         self.less = settings.coarser(len(rays))
-        self.most_unmet = settings.most_unmet + 1.0 - float(self.trials.rays.flux.sum() / rays.flux.sum())
+        strays = 1.0 - float(self.trials.rays.flux.sum() / rays.flux.sum())
+        # More light than that is no stray light, however far off: a lamp has a glow about its chip.
+        self.most_unmet = settings.most_unmet + (strays if strays <= settings.most_unmet else 0.0)
 
     def choice(self) -> SurfaceChoice:
         """Try all kinds, then take the simplest that none beats."""
@@ -185,6 +187,9 @@ class _Search:
         kinds += filter(None, [trials.spheres(), trials.cylinders(), trials.boxes()])
         finalists = self.finals([self.best(kind) for kind in kinds])
         able = [f for f in finalists if f.held_out.unmet <= self.most_unmet]
+        # Closed surfaces are sized without strays: where these are more, and nothing takes them up, what takes up most does.
+        least = min(f.held_out.unmet for f in finalists) + self.settings.most_unmet
+        able = able or [f for f in finalists if f.held_out.unmet <= least]
         winner = able[0]
         for challenger in able[1:]:
             if challenger.held_out.leads(winner.held_out, self.settings):

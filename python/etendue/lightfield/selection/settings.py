@@ -44,7 +44,7 @@ class SelectionSettings:
         [nat per ray] A smaller lead shows in no map, however certain it is.
     most_unmet : float
         Share of the flux, beside that of strays, from which on a surface that leaves it unmet is not chosen, whatever its
-        score: the flux of maps may be low by so much.
+        score: the flux of maps may be low by so much. What is far off and has more of the flux is not taken for strays.
     least_size : float
         Least size of a surface, against the coordinates of the rays: below it rounding alone may have made the source. A
         larger value enlarges small sources far from the origin.
