@@ -128,8 +128,8 @@ def read_step(path: Path, raw: bytes, tolerance: float | None, name: str | None 
 def _read(path: Path, reader: OpenCascade, names: _Names, tolerance: float | None, name: str | None) -> list[StepBody]:
     first = _bodies(path, reader.triangles(FIRST_LOOK, COARSE_TURN, relative=True), names)
     if name is not None and name not in [body.name for body in first]:
-        found, told = f"unknown body {name!r}", str(UnknownNameError("body", name, [body.name for body in first]))
-        raise FormatError(path, "body", found, told.removeprefix(f"{found}. "))
+        wrong, told = f"unknown body {name!r}", str(UnknownNameError("body", name, [body.name for body in first]))
+        raise FormatError(path, "body", wrong, told.removeprefix(f"{wrong}. "))
     wanted = [body for body in first if name in (None, body.name)]
     turn = TURN if tolerance is None else COARSE_TURN
     smallest = min(float(body.size.max()) for body in wanted)
