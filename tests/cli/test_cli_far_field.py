@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from pathlib import Path
 
@@ -27,6 +28,14 @@ def test_asked_steps_that_cannot_hold_the_beam_are_told(run: Run, tmp_path: Path
     assert far.flux == pytest.approx(10.0, rel=1e-5)
     _, out, _ = run("intensity", "spot.tm25ray", "--gamma-step", 0.25, "--c-planes", 4)
     assert "too wide" not in out
+
+
+def test_a_peak_that_is_lost_nearly_whole_is_told_as_people_write_it() -> None:
+    """Of a beam of exponent n in hats of width h about the axis, 1 - 6/(n h²) of the peak is lost: 99.7 %, not 1e+02 %."""
+    rays = rays_of((beam(20_000, exponent=3e5, c=0.0, gamma=0.0, seed=5), 10.0))
+    told = et.intensity_distribution(rays, 8, 5.0).notes[0]
+    lost = 100.0 * (1.0 - 6.0 / (3e5 * math.radians(5.0) ** 2))
+    assert f"peak about {lost:.3g} % too low" in told
 
 
 @pytest.mark.slow

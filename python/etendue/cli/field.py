@@ -10,10 +10,12 @@ import typer
 
 from etendue.cli.convert import in_unit, with_flux
 from etendue.cli.terminal import say
+from etendue.errors import ArgumentError
 from etendue.formats.rays import read_rays
-from etendue.lightfield.carrier import Surface, parse_surface
+from etendue.lightfield.carrier import SURFACES, Surface, parse_surface
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.storage import is_field_file
+from etendue.quantities.arguments import require_known
 from etendue.quantities.powers_of_ten import counted
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.spectral_lines import SpectralLines
@@ -24,8 +26,22 @@ FIELD_EXTENSIONS = (".h5", ".hdf5")
 
 
 def surface_option(text: str) -> Surface | Literal["auto"]:
-    """The carrier surface that an option names."""
-    return "auto" if text.strip() == "auto" else parse_surface(text)
+    """The carrier surface that an option names.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such surface or dimension.
+    ArgumentError
+        If a dimension is no number, or is stated of the surface that is chosen.
+    """
+    name, colon, _ = (piece.strip() for piece in text.partition(":"))
+    require_known(name, ("auto", *SURFACES), "surface")
+    if name != "auto":
+        return parse_surface(text)
+    if colon:
+        raise ArgumentError(f"surface {text!r}: auto chooses the dimensions; give auto alone, or state which surface.")
+    return "auto"
 
 
 def read_source(path: Path, flux: str | None, unit: str | None) -> RaySet | LightField:

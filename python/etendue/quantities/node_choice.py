@@ -12,6 +12,7 @@ import numpy.typing as npt
 from etendue.quantities.angle_table import gaps_of, hat_halves, hat_integrals
 from etendue.quantities.hat_sums import Hats, HatSums
 from etendue.quantities.intensity_nodes import Nodes, check_steps, planes_of
+from etendue.quantities.powers_of_ten import rounded
 from etendue.quantities.ray_stream import flux_power
 from etendue.quantities.smooth_light import Harmonics, nodes_around, parts_of
 
@@ -458,8 +459,9 @@ def _too_wide(sample: _Sample, asked: Nodes, suited: Nodes) -> list[str]:
     row = high % better.shape[1]
     around = np.array(suited.gamma)
     step = float(np.diff(around)[max(0, np.searchsorted(around, suited.table[row]) - 1)])
+    lost = 100.0 * loss / float(better.max())
     told = (
-        f"steps too wide for the beam: peak about {100.0 * loss / float(better.max()):.2g} % too low; steps as asked, "
+        f"steps too wide for the beam: peak about {rounded(lost, 2 if lost < 95.0 else 3)} % too low; steps as asked, "
         f"{max(np.diff(asked.gamma)):.4g}° of γ and {len(asked.planes)} planes, cannot hold it, γ in steps of {step:.2g}°"
         f"{f' and {len(suited.planes)} planes' if len(suited.planes) > len(asked.planes) else ''} would; "
         "the flux is not touched"
