@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -66,4 +67,28 @@ def test_workers_share_the_cores(monkeypatch: pytest.MonkeyPatch, cores: int | N
     monkeypatch.setattr(os, "environ", environment)
     monkeypatch.setattr(os, "cpu_count", lambda: cores)
     workers.pytest_xdist_setupnodes([object()] * count)
-    assert environment == dict.fromkeys(workers.THREADS, threads) | {workers.THREADS[1]: "3"}
+    assert environment == dict.fromkeys(workers.THREADS, threads) | {workers.THREADS[1]: "3"} | workers.ALLOCATOR
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="what a program began with is read on Linux")
+def test_workers_keep_memory_and_programs_that_they_start_do_not(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The allocator reads its limits when a program begins: the worker began with them, and what a test starts without."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(workers.__file__).parents[1]))
+    monkeypatch.delenv("PYTEST_XDIST_WORKER", raising=False)
+    stated = "MALLOC_TRIM_THRESHOLD_"
+    monkeypatch.delenv("MALLOC_MMAP_THRESHOLD_", raising=False)
+    monkeypatch.setenv(stated, "5000000")  # what a user says stays
+    pytester.makepyfile(
+        "import os, pathlib, subprocess, sys\n"
+        "def test_it():\n"
+        "    begun = pathlib.Path('/proc/self/environ').read_text()\n"
+        "    assert 'MALLOC_MMAP_THRESHOLD_=33554432' in begun and 'MALLOC_TRIM_THRESHOLD_=5000000' in begun\n"
+        "    code = 'import os; print(sorted(name for name in os.environ if name.startswith(\"MALLOC\")))'\n"
+        "    told = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True).stdout\n"
+        f"    assert told.strip() == \"['{stated}']\"\n"
+    )
+    found = pytester.runpytest_subprocess("-n", "1", "-p", "oracles.workers")
+    found.assert_outcomes(passed=1)

@@ -20,6 +20,9 @@ STEP_SIGNATURE = b"ISO-10303-21"
 WORKBOOK_SIGNATURE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 """How the container of Excel's older workbooks (.xls) begins."""
 
+_OF_TEXT = bytes(byte for byte in range(256) if byte >= 32 or byte in (9, 10, 11, 12, 13, 26))
+"""What may stand in text: no control characters but white space and the end-of-file mark of DOS."""
+
 ZIP_SIGNATURE = b"PK\x03\x04"
 """How ZIP archives begin. Members that are not compressed stand in them as they are."""
 
@@ -57,7 +60,7 @@ class Head:
     @property
     def is_text(self) -> bool:
         """Whether the head holds no control characters but white space; decides between binary and text formats."""
-        return not any(b < 32 and b not in (9, 10, 11, 12, 13, 26) for b in self.data[:4096])
+        return not self.data[:4096].translate(None, delete=_OF_TEXT)
 
     @property
     def is_zip(self) -> bool:

@@ -89,11 +89,12 @@ class _Reader:
 
     def value(self, line: int, what: str) -> float | None:
         """The number that a line begins with; units or remarks may follow. None if the line is empty."""
-        word = _first_word(self.text(line, what))
+        text = self.text(line, what)
+        word = _first_word(text)
         if not word:
             return None
-        if _THOUSANDS.match(self.text(line, what)):
-            thousands = f"{self.text(line, what)[:40]!r} has blanks between thousands"
+        if word != text and _THOUSANDS.match(text):
+            thousands = f"{text[:40]!r} has blanks between thousands"
             raise FormatError(self.path, f"line {line}, {what}", thousands, "Write the number without them.")
         if "," in word and "." not in word:
             word = word.replace(",", ".")
