@@ -93,3 +93,40 @@ def test_what_sums_no_flux_is_refused() -> None:
         result.flux_of("scatter")
     with pytest.raises(et.UnknownNameError, match=r"'scater'\. Did you mean 'scatter'"):
         result.flux_of("scater")
+
+
+@pytest.mark.parametrize(
+    ("n", "rays", "lamp"), [(3000, 3000, 0.0), (3000, 8000, 0.0), (9000, 3000, 0.0), (3000, 6000, 9.0)]
+)
+def test_all_light_has_the_error_of_one_cell(n: int, rays: int, lamp: float) -> None:
+    """In a white sphere, of rays of unequal flux: all of a set, each several times, a part of it, all of it beside a lamp.
+
+    The one cell of a detector knows its error as every cell does; all light on a grid in its place, or through a surface
+    there that sees light from below only, has the same.
+    """
+    rng = np.random.default_rng(3)
+    position, direction = rng.uniform(-1, 1, (n, 3)), rng.normal(size=(n, 3))
+    led = et.RaySet(position, direction, 10 ** rng.uniform(-3, 0, n))
+    place = {"width": 6, "height": 6, "at": [0, 0, 5], "toward": [0, 0, -1]}
+    black = {"shape": {"kind": "rectangle", "width": 12, "height": 12}, "at": [0, 0, 5.001], "finish": "absorber"}
+    ball = {"shape": {"kind": "sphere", "radius": 10}, "finish": {"kind": "lambertian", "reflectance": 0.9}}
+    beside = [{"kind": "point", "flux": lamp, "at": [0, 2, -3]}] if lamp else []
+    scene = et.Scene(
+        sources=[{"kind": "rays", "rays": led, "flux": FLUX}, *beside],
+        surfaces=[ball, black],
+        detectors=[
+            {"name": "one", "kind": "illuminance", "columns": 1, "rows": 1, **place},
+            {"name": "grid", "kind": "illuminance", "columns": 5, "rows": 4, **place},
+            {"name": "kept", "kind": "rays", "shape": {"kind": "rectangle", "width": 6, "height": 6}, "at": [0, 0, 5]},
+        ],
+    )
+    result = et.trace(scene, rays, 7)
+    one = result.illuminance["one"]
+    area = 6 * 6 / 1e6
+    expected = one.values[0, 0] * area, one.standard_error[0, 0] * area
+    assert expected[1] > 0.005 * expected[0] > 0.0
+    for name in ("one", "grid", "kept"):
+        assert result.flux_of(name) == pytest.approx(expected, rel=1e-9)
+    # Taken for independent, the cells would be surer of all light, or less sure, than they are.
+    cells = result.illuminance["grid"].standard_error
+    assert math.sqrt(np.nansum(cells**2)) * area / cells.size != pytest.approx(expected[1], rel=0.01)

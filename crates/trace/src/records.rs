@@ -36,6 +36,14 @@ impl Cell {
         self.products += w * contribution.flux;
         self.rays += 1;
     }
+
+    /// Adds the sums over other rays.
+    pub fn join(&mut self, other: &Self) {
+        self.sum += other.sum;
+        self.squares += other.squares;
+        self.products += other.products;
+        self.rays += other.rays;
+    }
 }
 
 /// What a ray contributes to a cell.

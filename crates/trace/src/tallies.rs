@@ -1,5 +1,7 @@
 //! What a trace amounts to: of one batch, and of the batches of a work unit in their order.
 
+use etendue_sampling::ordered::BATCH;
+
 use crate::dealing::Dealing;
 use crate::detector::{Detector, Recorded};
 use crate::events::EventReservoir;
@@ -40,6 +42,16 @@ impl Tally {
         }
     }
 
+    /// Adds the sums of a batch over all cells, stratum by stratum, to the last cell (see [`sum_up`]).
+    fn add_whole(&mut self, sums: &[Cell]) {
+        let each = self.cells.len().checked_div(sums.len()).unwrap_or(0);
+        for (own, sum) in self.cells.chunks_mut(each.max(1)).zip(sums) {
+            if let Some(last) = own.last_mut() {
+                last.join(sum);
+            }
+        }
+    }
+
     /// Brings what batches have of the same unit together, when all of them are added.
     fn settle(&mut self) {
         // Stable: sums are formed in the order of the batches.
@@ -53,6 +65,67 @@ impl Tally {
 pub fn brought_together(contributions: &mut Vec<Contribution>, cells: usize) {
     *contributions = in_order(std::mem::take(contributions), cells);
     merge(contributions);
+}
+
+/// What units contribute to all cells together: of rays without copies the sums, stratum by stratum; of rays with copies as
+/// contributions to one cell more, by its number, in the order of units.
+///
+/// # Panics
+/// If there are more cells than can be counted.
+#[must_use]
+pub fn sum_up<'a>(
+    contributions: impl Iterator<Item = &'a Contribution> + Clone,
+    cell: usize,
+    dealing: &Dealing,
+) -> (Vec<Cell>, Vec<Contribution>) {
+    let cell = u32::try_from(cell).expect("few cells");
+    let (mut sums, mut copies) = (vec![Cell::default(); dealing.plain()], vec![]);
+    each_unit(contributions, |unit, amount, flux| {
+        let whole = Contribution {
+            cell,
+            unit,
+            amount,
+            flux,
+        };
+        match sums.get_mut(dealing.stratum(unit)) {
+            Some(sum) => sum.add(&whole),
+            None => copies.push(whole),
+        }
+    });
+    (sums, copies)
+}
+
+/// Units among which those of a batch lie, in batches, so that each can have a place.
+const NEAR: u64 = 4;
+
+/// Calls `visit` with each unit of some contributions, in their order, with what it contributes to all cells and its flux.
+fn each_unit<'a>(contributions: impl Iterator<Item = &'a Contribution> + Clone, mut visit: impl FnMut(u64, f64, f64)) {
+    let units = contributions.clone().map(|own| own.unit);
+    let (Some(first), Some(last)) = (units.clone().min(), units.max()) else {
+        return;
+    };
+    if last - first < NEAR * BATCH {
+        #[allow(clippy::cast_possible_truncation, reason = "fewer than there is room for")]
+        let place = |unit: u64| (unit - first) as usize;
+        // Units that are not among them have no flux.
+        let mut whole = vec![(0.0, f64::NAN); place(last) + 1];
+        for own in contributions {
+            let (amount, flux) = &mut whole[place(own.unit)];
+            (*amount, *flux) = (*amount + own.amount, own.flux);
+        }
+        for (unit, (amount, flux)) in (first..).zip(whole) {
+            if !flux.is_nan() {
+                visit(unit, amount, flux);
+            }
+        }
+    } else {
+        let mut whole: Vec<_> = contributions.map(|own| Contribution { cell: 0, ..*own }).collect();
+        whole.sort_by_key(Contribution::place);
+        merge(&mut whole);
+        for own in whole {
+            visit(own.unit, own.amount, own.flux);
+        }
+    }
 }
 
 /// Bits of a cell's number that contributions are dealt out by at once.
@@ -240,15 +313,13 @@ impl TraceSums {
         self.ledger.merge(&part.ledger);
         for (number, recorded) in part.detectors.into_iter().enumerate() {
             self.tallies[number].add(&recorded.contributions, dealing);
+            self.tallies[number].add_whole(&recorded.whole);
             self.events[number].add(recorded.events);
             self.records[number].extend(recorded.rays);
             self.arrivals.extend(recorded.arrivals);
         }
-        for (cell, own) in self.emitted.cells.iter_mut().zip(part.own) {
-            cell.sum += own.sum;
-            cell.squares += own.squares;
-            cell.products += own.products;
-            cell.rays += own.rays;
+        for (cell, own) in self.emitted.cells.iter_mut().zip(&part.own) {
+            cell.join(own);
         }
         self.emitted.add(&part.copies, dealing);
     }
@@ -258,7 +329,6 @@ impl TraceSums {
 mod tests {
     use std::collections::BTreeMap;
 
-    use etendue_sampling::ordered::BATCH;
     use etendue_sampling::philox::Stream;
 
     use super::*;
@@ -286,6 +356,34 @@ mod tests {
             expected.sort_by_key(Contribution::place);
             assert_eq!(in_order(made, cells as usize), expected);
         }
+    }
+
+    #[test]
+    fn what_is_summed_up_is_that_of_each_unit() {
+        // Rays of a lamp; units of 50 and of 10⁶ rays that are copied lie close together, and far apart.
+        for length in [50, 1_000_000] {
+            let dealing = Dealing::new(&[1.0, 1.0], &[None, Some((0, length))], 4 * length);
+            let copied = 4 * length;
+            let made: Vec<Contribution> = [
+                (0, 7, 1.0),
+                (2, copied, 8.0),
+                (0, 9, 2.0),
+                (2, 7, 4.0),
+                (3, 8, 0.0),
+                (3, copied, 16.0),
+            ]
+            .map(|(cell, unit, amount)| contribution(cell, unit, amount))
+            .to_vec();
+            let (sums, copies) = sum_up(made.iter(), 5, &dealing);
+            let mut expected = Cell::default();
+            for (unit, amount) in [(7, 5.0), (8, 0.0), (9, 2.0)] {
+                expected.add(&contribution(5, unit, amount));
+            }
+            assert_eq!(sums, [expected]);
+            assert_eq!(copies, [contribution(5, copied, 24.0)]);
+        }
+        let none = sum_up([].iter(), 3, &Dealing::new(&[1.0], &[None], 9));
+        assert_eq!(none, (vec![Cell::default()], vec![]));
     }
 
     /// However a run is cut into work units: Σ w² is that of whole units, Σ w v of what they bring in the whole run, and none

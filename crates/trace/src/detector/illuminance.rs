@@ -56,13 +56,14 @@ impl Kind for Illuminance {
         self.columns as usize * self.rows as usize + 1
     }
 
+    fn sums_up(&self) -> bool {
+        true
+    }
+
     fn passing(&self, light: &Light<'_>, point: Vec3, out: &mut Recorded) {
         let (size, cells) = ([self.width, self.height], [self.columns, self.rows]);
         if let Some(cell) = illuminance_cell(&self.frame, size, cells, point, light.direction) {
-            // No tally has more cells than can be counted.
-            for cell in [cell, self.columns.saturating_mul(self.rows)] {
-                out.contribute(cell, light.state, light.state.flux);
-            }
+            out.contribute(cell, light.state, light.state.flux);
         }
     }
 }

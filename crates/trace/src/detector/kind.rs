@@ -8,7 +8,7 @@ use crate::exitance_cells::FacePoint;
 use crate::guide::Arrival;
 use crate::medium_cache::MediumCache;
 use crate::ray_state::RayState;
-use crate::records::{CollectedRay, Contribution};
+use crate::records::{Cell, CollectedRay, Contribution};
 use crate::scatter::SurfaceEvent;
 use crate::scene::Scene;
 
@@ -108,8 +108,12 @@ pub struct Scatter<'a> {
 pub struct Recorded {
     /// Contributions to its cells, by ray.
     pub contributions: Vec<Contribution>,
+    /// Sums over all of its cells, stratum by stratum, if they are formed (see [`Kind::sums_up`]).
+    pub whole: Vec<Cell>,
     /// Rays.
     pub rays: Vec<CollectedRay>,
+    /// Their numbers in the run, if what they bring to the last cell is to be summed up.
+    pub numbers: Vec<u64>,
     /// Scatter events.
     pub events: EventReservoir,
     /// Light that smooth surfaces sent to diffuse ones.
@@ -124,6 +128,18 @@ impl Recorded {
             events: EventReservoir::of_batch(most_events, batches),
             ..Self::default()
         }
+    }
+
+    /// What the rays contribute that are kept with their numbers.
+    #[must_use]
+    pub fn of_rays(&self) -> Vec<Contribution> {
+        let of_ray = |(ray, unit): (&CollectedRay, &u64)| Contribution {
+            cell: 0,
+            unit: *unit,
+            amount: ray.flux,
+            flux: ray.flux,
+        };
+        self.rays.iter().zip(&self.numbers).map(of_ray).collect()
     }
 
     /// What a ray contributes to a cell.
@@ -148,6 +164,11 @@ pub trait Kind {
     /// Number of cells that flux is summed in.
     fn cells(&self) -> usize {
         0
+    }
+
+    /// Whether its last cell is given all that the others have, or that its rays bring, when a batch is done.
+    fn sums_up(&self) -> bool {
+        false
     }
 
     /// Scatter events that it holds at most.

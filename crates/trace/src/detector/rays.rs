@@ -25,8 +25,12 @@ impl Kind for Rays {
         1
     }
 
+    fn sums_up(&self) -> bool {
+        true
+    }
+
     fn passing(&self, light: &Light<'_>, point: Vec3, out: &mut Recorded) {
         out.rays.push(light.at(point));
-        out.contribute(0, light.state, light.state.flux);
+        out.numbers.push(light.state.ray);
     }
 }

@@ -29,7 +29,7 @@ use crate::ray_start::start_near;
 use crate::ray_state::RayState;
 use crate::records::Contribution;
 use crate::scene::Scene;
-use crate::tallies::{BatchSums, brought_together};
+use crate::tallies::{BatchSums, brought_together, sum_up};
 
 /// The purpose under which the events of traced rays are drawn (see [`Pairs::new`]).
 const PURPOSE_TRACE: u32 = 0x5452_4143;
@@ -67,14 +67,20 @@ pub fn trace_batch(scene: &Scene, detectors: &[Detector], run: &Run<'_>, dealing
     let mut trace = BatchTrace::new(scene, detectors, run, dealing);
     trace.batch(batch);
     let mut out = trace.block.out;
-    let counted = detectors
-        .iter()
-        .zip(&mut out.detectors)
-        .map(|(d, recorded)| (d.cells(), &mut recorded.contributions));
-    for (cells, contributions) in counted.chain([(scene.sources.len() + 1, &mut out.copies)]) {
-        dealing.by_units(batch, contributions.iter_mut());
-        brought_together(contributions, cells);
+    for (detector, recorded) in detectors.iter().zip(&mut out.detectors) {
+        dealing.by_units(batch, recorded.contributions.iter_mut());
+        let mut copies = vec![];
+        if detector.sums_up() {
+            let mut of_rays = recorded.of_rays();
+            dealing.by_units(batch, of_rays.iter_mut());
+            let all = of_rays.iter().chain(&recorded.contributions);
+            (recorded.whole, copies) = sum_up(all, detector.cells() - 1, dealing);
+        }
+        brought_together(&mut recorded.contributions, detector.cells());
+        recorded.contributions.append(&mut copies);
     }
+    dealing.by_units(batch, out.copies.iter_mut());
+    brought_together(&mut out.copies, scene.sources.len() + 1);
     out
 }
 
