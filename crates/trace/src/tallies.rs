@@ -360,17 +360,17 @@ mod tests {
 
     #[test]
     fn what_is_summed_up_is_that_of_each_unit() {
-        // Rays of a lamp; units of 50 and of 10⁶ rays that are copied lie close together, and far apart.
+        // Rays of a lamp; units of 50 and of 10⁶ rays with copies lie close together, and far apart.
         for length in [50, 1_000_000] {
             let dealing = Dealing::new(&[1.0, 1.0], &[None, Some((0, length))], 4 * length);
-            let copied = 4 * length;
+            let ahead = 4 * length;
             let made: Vec<Contribution> = [
                 (0, 7, 1.0),
-                (2, copied, 8.0),
+                (2, ahead, 8.0),
                 (0, 9, 2.0),
                 (2, 7, 4.0),
                 (3, 8, 0.0),
-                (3, copied, 16.0),
+                (3, ahead, 16.0),
             ]
             .map(|(cell, unit, amount)| contribution(cell, unit, amount))
             .to_vec();
@@ -380,7 +380,7 @@ mod tests {
                 expected.add(&contribution(5, unit, amount));
             }
             assert_eq!(sums, [expected]);
-            assert_eq!(copies, [contribution(5, copied, 24.0)]);
+            assert_eq!(copies, [contribution(5, ahead, 24.0)]);
         }
         let none = sum_up([].iter(), 3, &Dealing::new(&[1.0], &[None], 9));
         assert_eq!(none, (vec![Cell::default()], vec![]));
