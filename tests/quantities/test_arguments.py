@@ -483,3 +483,14 @@ def test_the_intensity_of_a_light_field_is_its_own() -> None:
     assert drawn.flux == pytest.approx(found.flux)
     row = 3
     assert abs(drawn.values[:, row] - found.values[:, row]).max() < 4 * drawn.standard_error[:, row].max()
+
+
+@pytest.mark.parametrize("value", [RINGS.ray_set(), LMAP, EMAP, TABLE], ids=lambda value: type(value).__name__)
+def test_fields_that_are_not_there_are_not_replaced(value: Any) -> None:
+    kind = type(value).__name__
+    assert value.replace(notes=("new",)).notes == ("new",) if kind != "RaySet" else value.replace(flux_unit="W")
+    with pytest.raises(et.UnknownNameError, match=rf"field of a {kind} 'provenence'\. Did you mean 'provenance'"):
+        value.replace(provenence=None)
+    if kind == "RaySet":
+        with pytest.raises(et.UnknownNameError, match=r"field of a RaySet 'flux'\. Did you mean 'flux_unit'"):
+            value.replace(flux=3.0)

@@ -14,7 +14,7 @@ from etendue import _core
 from etendue.errors import ArgumentError, UnitError
 from etendue.lightfield.carrier import Surface
 from etendue.lightfield.counting import FloatArray
-from etendue.quantities.arguments import as_numbers, require_known
+from etendue.quantities.arguments import as_numbers, require_fields, require_known
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import checked_threads
 from etendue.quantities.spectral_lines import SpectralLines
@@ -247,6 +247,7 @@ class EtendueDensity:
 
     def replace(self, **changes: Any) -> Self:
         """The same field with some attributes changed."""
+        require_fields(changes, type(self))
         return dataclasses.replace(self, **changes)
 
 

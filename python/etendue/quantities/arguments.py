@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import numbers
 import os
@@ -135,6 +136,35 @@ def require_known(given: object, known: Collection[str], what: str) -> None:
     """
     if not isinstance(given, str) or given not in known:
         raise UnknownNameError(what, given, known)
+
+
+def require_fields(changes: Collection[str], kind: type, called: str = "") -> None:
+    """Refuse names of fields that a dataclass does not have, before `dataclasses.replace` fails in words of its own.
+
+    Parameters
+    ----------
+    changes : collection of str
+        The names.
+    kind : type
+        The dataclass.
+    called : str
+        What people call it; its name if empty.
+
+    Raises
+    ------
+    UnknownNameError
+        If so; suggests the nearest.
+
+    Examples
+    --------
+    >>> from etendue.quantities.observer import Screen
+    >>> require_fields({"column": 12}, Screen)
+    Traceback (most recent call last):
+    etendue.errors.UnknownNameError: unknown field of a Screen 'column'. Did you mean 'columns'? Known: columns, height, ...
+    """
+    known = [field.name for field in dataclasses.fields(kind) if field.init]
+    for name in changes:
+        require_known(name, known, f"field of a {called or kind.__name__}")
 
 
 def require_number(given: Any, what: str, instead: str = "a number") -> None:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.quantities.angle_table import ROUNDING, gaps_of, hat_integrals, kinks_along, kinks_around
-from etendue.quantities.arguments import as_numbers, require, require_known, require_number
+from etendue.quantities.arguments import as_numbers, require, require_fields, require_known, require_number
 from etendue.quantities.labelled import dataset
 from etendue.quantities.luminaire_facts import LUMINAIRE_FACTS, mirrored_facts, turned_facts
 from etendue.quantities.notebook import InNotebook
@@ -386,6 +386,7 @@ class Intensity(InNotebook):
 
     def replace(self, **changes: Any) -> Intensity:
         """A copy with some fields changed (`dataclasses.replace`)."""
+        require_fields(changes, type(self))
         return dataclasses.replace(self, **changes)
 
     def scaled(self, factor: float) -> Intensity:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError
-from etendue.quantities.arguments import as_numbers, require, require_known, require_path
+from etendue.quantities.arguments import as_numbers, require, require_fields, require_known, require_path
 from etendue.quantities.labelled import dataset
 from etendue.quantities.notebook import InNotebook
 from etendue.quantities.observer import Screen
@@ -99,6 +99,7 @@ class PixelMap(InNotebook, GoesOut, abc.ABC):
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed (`dataclasses.replace`)."""
+        require_fields(changes, type(self))
         return dataclasses.replace(self, **changes)  # type: ignore[type-var]  # its kinds are dataclasses
 
     def save(self, path: str | os.PathLike[str]) -> tuple[str, ...]:

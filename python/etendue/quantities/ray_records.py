@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError, UnknownNameError
-from etendue.quantities.arguments import require, require_known
+from etendue.quantities.arguments import require, require_fields, require_known
 from etendue.quantities.file_records import AnyRecords, FileRecords
 from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_stream import FloatArray, Progress, RayStream, Tally, checked_threads
@@ -162,6 +162,7 @@ class RayRecords(RayStream):
 
     def replace(self, **changes: Any) -> Self:
         """A set over the same records with some fields of its meaning changed."""
+        require_fields(changes, RaySetMeaning, "RaySet")
         changed = type(self).from_records(self._records, dataclasses.replace(self._meaning, **changes))
         # The account of the flux as stored depends on the records alone: no second pass for it, and no second warning.
         changed._tally = self._tally  # noqa: SLF001 - its own kind

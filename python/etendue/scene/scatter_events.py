@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.errors import ArgumentError, SceneWarning
+from etendue.quantities.arguments import require_fields
 from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.provenance import Provenance
 from etendue.scatter.building import core_scene
@@ -170,6 +171,7 @@ class ScatterEvents:
 
     def replace(self, **changes: Any) -> ScatterEvents:
         """A copy with some fields changed (`dataclasses.replace`), as the scene if it comes without or has moved."""
+        require_fields(changes, type(self))
         return dataclasses.replace(self, **changes)
 
     @cached_property

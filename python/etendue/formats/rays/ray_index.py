@@ -16,7 +16,7 @@ from etendue.formats.input import as_path
 from etendue.formats.output import atomic_output
 from etendue.formats.rays.index_building import Counted, IndexTables, Records, count_rays, fill_index
 from etendue.formats.rays.index_file import DAMAGED, HEADER, map_new, read_index, text_of, write_tables
-from etendue.quantities.arguments import require, require_callable
+from etendue.quantities.arguments import require, require_callable, require_fields
 from etendue.quantities.file_records import AnyRecords
 from etendue.quantities.ray_records import RaySetMeaning
 from etendue.quantities.ray_set import RaySet
@@ -144,6 +144,7 @@ class RayIndex(RaySet):
         """The index over the same rays with some fields of its meaning changed; a plain set if lengths are among them."""
         if changes.get("length_scale", self.meaning.length_scale) != self.meaning.length_scale:
             return super().replace(**changes)
+        require_fields(changes, RaySetMeaning, "RaySet")
         return RayIndex(self.records, dataclasses.replace(self.meaning, **changes), self._tables, self.tally)
 
     def __repr__(self) -> str:
