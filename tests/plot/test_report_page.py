@@ -12,6 +12,7 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.errors import ArgumentError, UnknownNameError
+from etendue.lightfield.fit_cache import FOLDER_VARIABLE
 from etendue.lightfield.storage import as_stored
 from etendue.luminance.source_report import SourceReport
 from etendue.plot.report_page import A4, MARGIN, PAGE_TYPES, report_html
@@ -224,9 +225,12 @@ def test_the_standard_views_stand_about_the_light(file: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_source_that_shines_down_is_looked_at_from_below_and_dark_views_are_black() -> None:
+def test_a_source_that_shines_down_is_looked_at_from_below_and_dark_views_are_black(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A Lambertian source that is turned over has the intensity Φ/π seen from below, within the error that it has if
     all pixels err together; from above it is dark."""
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))  # three reports on one fit
     rings = et.RingSource(rays=6_000)
     turned = rings.ray_set().rotated((1, 0, 0), 180)
     found = et.report_source(turned, surface=et.Sphere(radius=40), forecast=False)

@@ -40,18 +40,10 @@ def fingerprint(record: Mapping[str, Any]) -> str:
 
 def _feed(digest: Any, value: Any) -> None:
     """Add a plain value to a digest, with its kind and length, so that no two values look alike."""
+    # Numbers and texts, of which there are most, before the kinds that Python has to ask about at length.
     match value:
-        case Mapping():
-            digest.update(b"{%d" % len(value))
-            for key in sorted(value):
-                _feed(digest, key)
-                _feed(digest, value[key])
         case str():
             digest.update(b"s%d:" % len(value) + value.encode())
-        case Sequence():
-            digest.update(b"[%d" % len(value))
-            for held in value:
-                _feed(digest, held)
         case bool() | None:
             digest.update(repr(value).encode())
         case int() | float() | np.number():
@@ -59,6 +51,15 @@ def _feed(digest: Any, value: Any) -> None:
         case np.ndarray():
             digest.update(f"a{value.dtype.kind}{value.shape}".encode())
             digest.update(np.ascontiguousarray(value).data)
+        case dict() | Mapping():
+            digest.update(b"{%d" % len(value))
+            for key in sorted(value):
+                _feed(digest, key)
+                _feed(digest, value[key])
+        case list() | tuple() | Sequence():
+            digest.update(b"[%d" % len(value))
+            for held in value:
+                _feed(digest, held)
         case _core.LightField():
             flux = value.flux()
             _feed(digest, flux)
