@@ -45,6 +45,28 @@ def test_options_are_refused_with_the_files_that_they_are_for(run: Run, option: 
     assert ("light fields" in found.err) == (option != "--flux")
 
 
+def test_rays_are_turned_and_then_moved(run: Run) -> None:
+    """About y by 90°: +z becomes +x, +x becomes −z; then 5 mm along x."""
+    start = np.column_stack([np.arange(10.0), np.full(10, 2.0), np.full(10, 3.0)])
+    et.write_rays("up.tm25ray", et.RaySet(start, UP, np.ones(10)))
+    found = run("convert", "up.tm25ray", "side.tm25ray", "--rotate", "0,2,0,90", "--move", "5,0,-1")
+    assert found.status == 0
+    side = et.read_rays("side.tm25ray")
+    np.testing.assert_allclose(side.direction, np.tile([1.0, 0, 0], (10, 1)), atol=1e-7)
+    np.testing.assert_allclose(
+        side.position, np.column_stack([start[:, 2] + 5, start[:, 1], -start[:, 0] - 1]), atol=1e-6
+    )
+    for option, value, told in (
+        ("--rotate", "0,0,1", "'0,0,1': give 4 numbers separated by commas, e.g. --rotate 0,1,0,90"),
+        ("--rotate", "0,0,0,90", "--rotate 0,0,0,90: the axis has no length"),
+        ("--move", "up", "'up': give 3 numbers"),
+    ):
+        found = run("convert", "up.tm25ray", "none.tm25ray", option, value)
+        assert found.status == 2
+        assert told in found.err
+        assert not Path("none.tm25ray").exists()
+
+
 GREEN = 555.0
 """Wavelength at which V(λ) is 1 [nm]: a watt is 683 lm."""
 

@@ -10,7 +10,7 @@ import typer
 
 from etendue.cli.options import ray_format
 from etendue.cli.stated import refuse
-from etendue.cli.terminal import check_folder, complain, count, one_of, print_json, progress_bar, say
+from etendue.cli.terminal import check_folder, complain, count, numbers, one_of, print_json, progress_bar, say
 from etendue.errors import UnitError
 from etendue.formats.rays import format_of_output, read_rays, write_rays
 from etendue.formats.rays.ray_format import RayFormat
@@ -45,6 +45,18 @@ def convert(
         typer.Option("--subset", help="Write this many rays, drawn at random.", parser=count(0), metavar="NUMBER"),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", help="Seed of --subset.")] = 1,
+    rotate: Annotated[
+        str | None,
+        typer.Option(
+            "--rotate",
+            help="Turn the rays about an axis through the origin, right-handed: the axis, then degrees, e.g. 0,1,0,90.",
+            metavar="X,Y,Z,ANGLE",
+        ),
+    ] = None,
+    move: Annotated[
+        str | None,
+        typer.Option("--move", help="Shift the rays by so many mm, after --rotate, e.g. 0,0,12.5.", metavar="X,Y,Z"),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Read one or more ray files and write one; complaints and losses are printed."""
@@ -54,6 +66,10 @@ def convert(
     chosen = format_of_output(output, format)
     if subset is None:
         refuse(["seed"], "for --subset, which draws rays; without it all are written as they are")
+    turn = None if rotate is None else numbers(rotate, 4, "--rotate", "0,1,0,90")
+    if turn is not None and not any(turn[:3]):
+        raise typer.BadParameter(f"--rotate {rotate}: the axis has no length; give e.g. 0,1,0,90 for 90° about y")
+    offset = None if move is None else numbers(move, 3, "--move", "0,0,12.5")
     if flux and len(flux) != len(inputs):
         raise typer.BadParameter(f"--flux was given {len(flux)} times for {len(inputs)} input files")
     fluxes: list[str | None] = [*flux] if flux else [None] * len(inputs)
@@ -64,6 +80,8 @@ def convert(
     rays = RaySet.merge(sets) if len(sets) > 1 else sets[0]
     if subset is not None:
         rays = rays.subset(subset, seed)
+    rays = rays if turn is None else rays.rotated(turn[:3], turn[3])
+    rays = rays if offset is None else rays.moved(offset)
     if wanted is None:
         rays, turned = _as_stored(rays, chosen)
         assumed += turned

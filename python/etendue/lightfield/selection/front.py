@@ -18,8 +18,8 @@ class Turn(NamedTuple):
 
     Examples
     --------
-    >>> Turn((0.0, -1.0, 0.0), 40.0).told
-    'rays.rotated((0, -1, 0), 40)'
+    >>> Turn((0.0, -1.0, 0.0), 40.0).told, Turn((0.0, -1.0, 0.0), 40.0).option
+    ('rays.rotated((0, -1, 0), 40)', 'etendue convert --rotate 0,-1,0,40')
     """
 
     axis: tuple[float, float, float]
@@ -28,8 +28,16 @@ class Turn(NamedTuple):
     @property
     def told(self) -> str:
         """The call in Python, to six digits."""
-        axis = ", ".join(f"{round(value, 6) + 0.0:.6g}" for value in self.axis)
-        return f"rays.rotated(({axis}), {self.angle:.6g})"
+        return f"rays.rotated(({', '.join(self._axis)}), {self.angle:.6g})"
+
+    @property
+    def option(self) -> str:
+        """The option of the command line, likewise."""
+        return f"etendue convert --rotate {','.join(self._axis)},{self.angle:.6g}"
+
+    @property
+    def _axis(self) -> list[str]:
+        return [f"{round(value, 6) + 0.0:.6g}" for value in self.axis]
 
 
 def mean_direction(direction: FloatArray, flux: FloatArray) -> FloatArray:
