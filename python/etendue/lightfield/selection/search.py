@@ -326,15 +326,14 @@ class _Search:
                 lead, error = turned.held_out.score.lead(winner.held_out.score)
                 yield (
                     f"the source looks towards {towards}: turned so that it looks towards +Z ({turn.option}, in Python "
-                    f"{turn.told}), a {turned.surface.NAME} predicts rays held out of the fit better by {lead:.4f} ± {error:.4f}; a light "
-                    "field of the turned rays is sharper"
+                    f"{turn.told}), a {turned.surface.NAME} predicts rays held out of the fit better by {lead:.4f} ± "
+                    f"{error:.4f}; a light field of the turned rays is sharper"
                 )
                 return
         if mean[2] < aslant * length:
             yield (
-                f"the light heads towards {towards} on average; planes, disks, hemispheres and domes "
-                "shine towards +Z: if one of these would suit the source, turn the rays (etendue convert --rotate, in Python "
-                "rays.rotated)"
+                f"the light heads towards {towards} on average; planes, disks, hemispheres and domes shine towards +Z: if "
+                "one of these would suit the source, turn the rays (etendue convert --rotate, in Python rays.rotated)"
             )
 
     def flat_when(self, turn: Turn) -> _Scored | None:
