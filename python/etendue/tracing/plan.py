@@ -229,6 +229,6 @@ def check_cells(detections: tuple[Detection[Any], ...]) -> None:
     ArgumentError
         If so.
     """
-    total = sum(detection.cells for detection in detections)
+    total = sum(detection.judged for detection in detections)
     if total > MOST_CELLS:
         raise ArgumentError(f"the detectors have {total:,} cells together; {MOST_CELLS:,} are the most. Use fewer.")

@@ -208,7 +208,7 @@ def trace_work(
         lambda count: far_field_nodes(core, compiled, count, seed, most_events, threads),
         before,
     )
-    cells = sum(detection.cells for detection in plan.detections)
+    cells = sum(detection.judged for detection in plan.detections)
     held = f"{scene.name or 'the scene'}: detectors with {cells:,} cells"
     require_memory(CELL_BYTES * cells * plan.dealing.strata, held)
     return TraceWork(plan, core.with_far_fields([nodes.core() for nodes in plan.far_fields]))
