@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import etendue as et
 import numpy as np
 import pytest
@@ -51,6 +53,47 @@ def test_a_cylinder_along_another_axis_is_that_along_z_turned() -> None:
         owner_there, there = _core.cross_parts([p.core() for p in turned.parts()], x, k)
         np.testing.assert_array_equal(owner_there, owner)
         np.testing.assert_allclose(there[owner >= 0], at[owner >= 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("towards", [(0.3, -0.5, 0.7), (0, 2, 0), (-1, 0.2, -0.9), (0, 0, -3), (1e-4, 0, -1)])
+def test_a_flat_surface_that_looks_aside_is_the_upright_one_turned(towards: tuple[float, float, float]) -> None:
+    """Rays and surface turned together, by Rodrigues' formula: a line leaves the same part at the same place and direction.
+
+    The normal of its first part is the direction itself, and what is open is sized as it is for upright rays.
+    """
+    position, direction = bundle(4000, 9)
+    rays = et.RaySet(position, direction, np.ones(4000))
+    unit = np.array(towards) / np.linalg.norm(towards)
+    axis = np.cross([0, 0, 1], unit)
+    about = axis if axis.any() else [1.0, 0.0, 0.0]
+    turned = rays.rotated(about, float(np.degrees(np.arctan2(np.linalg.norm(axis), unit[2]))))
+    plane = et.Plane(0.7, 2.5, 1.5, (0.1, -0.4), (0.2, -0.1, 0.3, 0.0), 2, 9.0)
+    for upright in (plane, et.Disk(radius=1.3, z=-0.2, centre=(0.5, 1 / 7))):
+        there = dataclasses.replace(upright, towards=towards)
+        np.testing.assert_allclose(there.parts()[0].axes[2], unit, atol=1e-15)
+        owner, at = _core.cross_parts([p.core() for p in upright.parts()], rays.position, rays.direction)
+        assert (owner >= 0).mean() > 0.3
+        parts = [p.core() for p in there.parts()]
+        owner_there, at_there = _core.cross_parts(parts, turned.position, turned.direction)
+        assert np.count_nonzero(owner_there != owner) <= 1  # a line at an edge, by rounding
+        same = (owner >= 0) & (owner == owner_there)
+        np.testing.assert_allclose(at_there[same], at[same], atol=1e-9)
+    for spec in ("plane:z=0.4", "disk:z=0.4"):
+        sized, own = (et.parse_surface(spec).sized_for(rays), et.parse_surface(_aside(spec, towards)).sized_for(turned))
+        assert not own.open_dimensions
+        for part, mine in zip(sized.parts(), own.parts(), strict=True):
+            np.testing.assert_allclose(mine.size, part.size, rtol=1e-9)
+
+
+def _aside(spec: str, towards: tuple[float, float, float]) -> str:
+    return f"{spec},towards={'/'.join(map(str, towards))}"
+
+
+def test_a_direction_is_one_of_three_numbers_with_a_length() -> None:
+    assert et.Disk(radius=1, towards=(0, 0, 2)) == et.Disk(radius=1)
+    for wrong, told in (((0, 0, 0), "has no length"), ((1, 0), "give 3 numbers"), ("up", "numbers")):
+        with pytest.raises(ArgumentError, match=told):
+            et.Plane(towards=wrong)  # type: ignore[arg-type]
 
 
 def test_an_axis_that_there_is_none_is_refused_with_those_that_there_are() -> None:

@@ -18,7 +18,8 @@ from etendue.denoising.fourier_plane import blur_matrix
 from etendue.lightfield.carrier import Plane, Sphere
 from etendue.lightfield.carrier.part import FLAT, Focus
 from etendue.lightfield.carrier.plane import MOST_FRAMES
-from etendue.lightfield.carrier.sizing import STRAY, hits_upwards
+from etendue.lightfield.carrier.sizing import STRAY, hits_upwards, sizing_rays
+from etendue.lightfield.carrier.towards import upright
 from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.pilot_sample import even_density, pilot_sample, selected_rays
 from etendue.lightfield.selection.scorer import WITH_IMAGES, SurfaceScorer
@@ -149,6 +150,10 @@ def focused(plane: Plane, rays: RayStream, seed: int = 1, threads: int | None = 
     >>> plane.focus is None, plane.frames, round(plane.width)
     (True, 0, 60)
     """
+    if plane.towards is not None:
+        turned = upright(sizing_rays(rays), plane.towards)
+        found = focused(dataclasses.replace(plane, towards=None), turned, seed, threads)
+        return dataclasses.replace(found, towards=plane.towards)
     some = pilot_sample(rays, RAYS)
     up = some.direction[:, 2] > GRAZING
     enough = np.count_nonzero(up) >= FEWEST

@@ -6,10 +6,11 @@ import dataclasses
 from types import MappingProxyType
 
 from etendue.errors import ArgumentError
-from etendue.lightfield.carrier.part import FLAT, WORLD, Focus, Part
-from etendue.lightfield.carrier.sizing import SLACK, extent, hits_upwards
+from etendue.lightfield.carrier.part import FLAT, WORLD, Focus, Part, Triple
+from etendue.lightfield.carrier.sizing import SLACK, extent, hits_upwards, sizing_rays
 from etendue.lightfield.carrier.sphere import Sphere
 from etendue.lightfield.carrier.surface import Surface
+from etendue.lightfield.carrier.towards import checked_towards, turned, upright
 from etendue.quantities.arguments import require_number
 from etendue.quantities.ray_stream import RayStream
 
@@ -18,7 +19,7 @@ MOST_FRAMES = 16
 
 @dataclasses.dataclass(frozen=True)
 class Plane(Surface):
-    """A rectangle in a plane of constant z that emits towards +Z, and frames about it for what lies farther out.
+    """A rectangle in a plane of constant z that emits towards +Z, or turned, and frames about it for what lies farther out.
 
     Light that leaves the plane need not be sharp there: a die under a window or a lens is seen at a depth that changes with
     the angle. `focus` says at which, so that one image of the die serves all directions. Frames, each twice as large as
@@ -40,11 +41,14 @@ class Plane(Surface):
     rest : float, optional
         Radius of a sphere about the middle [mm] that takes up all other lines: light that heads downwards, or comes from far
         beside. None: it is not in the field.
+    towards : tuple of 3 floats, optional
+        Direction that it emits towards; None: +Z. All else is as it was before the surface was turned there about the
+        origin, by the shortest way from +Z: `z` is then its distance from the origin along `towards`.
 
     Raises
     ------
     ArgumentError
-        If a number is not finite, a length is not above 0, or there are no such frames.
+        If a number is not finite, a length is not above 0, a direction has none, or there are no such frames.
 
     Examples
     --------
@@ -52,11 +56,13 @@ class Plane(Surface):
     12.0
     >>> [part.size for part in Plane(z=0, width=4, height=3, centre=(0, 0), frames=2).parts()]
     [(4.0, 3.0), (8.0, 6.0), (16.0, 12.0)]
+    >>> Plane(z=7, width=4, height=3, centre=(0, 0), towards=(1, 0, 0)).parts()[0].centre
+    (7.0, 0.0, 0.0)
     """
 
     NAME = "plane"
     LENGTHS = ("width", "height", "rest")
-    SIZES = MappingProxyType({"centre": 2, "focus": len(FLAT)})
+    SIZES = MappingProxyType({"centre": 2, "focus": len(FLAT), "towards": 3})
     UNSAID = MappingProxyType({"frames": 0})
     z: float = 0.0
     width: float | None = None
@@ -65,6 +71,7 @@ class Plane(Surface):
     focus: Focus | None = None
     frames: int = 0
     rest: float | None = None
+    towards: Triple | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -72,11 +79,12 @@ class Plane(Surface):
         if not (float(self.frames).is_integer() and 0 <= self.frames <= MOST_FRAMES):
             raise ArgumentError(f"Plane: frames is {self.frames!r}; give a whole number from 0 to {MOST_FRAMES}.")
         object.__setattr__(self, "frames", int(self.frames))
+        object.__setattr__(self, "towards", checked_towards(self.towards, "Plane"))
 
     @property
     def open_dimensions(self) -> tuple[str, ...]:
-        """All that are None but the focus, which is then flat, and the rest, which is then left out."""
-        return tuple(name for name in super().open_dimensions if name not in ("focus", "rest"))
+        """All that are None but the focus, which is then flat, the rest, which is left out, and the direction +Z."""
+        return tuple(name for name in super().open_dimensions if name not in ("focus", "rest", "towards"))
 
     def parts(self) -> tuple[Part, ...]:
         """The rectangle, then the frames from within, then both halves of the sphere."""
@@ -90,12 +98,15 @@ class Plane(Surface):
             for k in range(1, self.frames + 1)
         )
         beyond = () if self.rest is None else Sphere(self.rest, centre).parts()
-        return (window, *frames, *beyond)
+        return tuple(turned(part, self.towards) for part in (window, *frames, *beyond))
 
     def sized_for(self, rays: RayStream) -> Plane:
         """The smallest rectangle that the rays' lines cross, but for strays far off; of a stated size, where most do."""
         if not self.open_dimensions:
             return self
+        if self.towards is not None:
+            sized = dataclasses.replace(self, towards=None).sized_for(upright(sizing_rays(rays), self.towards))
+            return dataclasses.replace(sized, towards=self.towards)
         hits, flux = hits_upwards(rays, self.z, "Plane", self.focus or FLAT)
         sizes, centres = (self.width, self.height), self.centre or (None, None)
         spans = [extent(v, flux, c, size) for v, c, size in zip(hits.T, centres, sizes, strict=True)]

@@ -52,7 +52,8 @@ class Surface(abc.ABC):
                 continue
             several = isinstance(value, Iterable) and not isinstance(value, str | bytes)
             for one in value if several else (value,):
-                require_number(one, f"{type(self).__name__}: {field.name}", "numbers" if several else "a number")
+                instead = "numbers" if several or field.name in self.SIZES else "a number"
+                require_number(one, f"{type(self).__name__}: {field.name}", instead)
             # Whatever numbers came in, floats are compared, printed and saved.
             numbers = tuple(float(v) for v in value) if several else float(value)
             object.__setattr__(self, field.name, numbers)

@@ -11,10 +11,12 @@ import numpy as np
 from etendue.concurrency import on_one_blas_thread
 from etendue.errors import ArgumentError
 from etendue.lightfield.carrier import Disk, Dome, Hemisphere, Plane, Surface
+from etendue.lightfield.carrier.part import Triple
 from etendue.lightfield.carrier.sizing import SLACK
+from etendue.lightfield.carrier.towards import direction_found, shortest_turn, upright
 from etendue.lightfield.focusing import focused_about
 from etendue.lightfield.pilot_sample import FEWEST, even_density, pilot_sample
-from etendue.lightfield.selection.front import Turn, mean_direction, start_normal, turn_upright
+from etendue.lightfield.selection.front import mean_direction, start_normal
 from etendue.lightfield.selection.line_search import golden_section, round_numbers_near
 from etendue.lightfield.selection.scorer import WITH_IMAGES, HeldOutScore, SurfaceScorer
 from etendue.lightfield.selection.settings import DEFAULT, Grid, SelectionSettings
@@ -105,7 +107,7 @@ def choose_surface(
     the others; see `SurfaceScorer`. A surface replaces a simpler one if it leads by three standard errors of the difference.
     None is chosen that leaves more than a hundredth of the flux unmet, beside that of strays far off, which may be as much
     again, unless all do. If the field then turns out to blur where some of the light comes from, `LightField.fit` tries the
-    next ones. Of a source that looks aside a note tells by how much a flat surface would be better, were the rays turned.
+    next ones. Of a source that looks aside, flat surfaces that emit there are tried as well.
 
     Parameters
     ----------
@@ -179,25 +181,36 @@ class _Search:
         backwards = float(flux[~trials.up].sum() / flux.sum())
         if backwards <= self.settings.most_backwards and np.count_nonzero(trials.up) >= FEWEST:
             z, depths = self.depth()
-            flats = trials.flats(z)
-            kinds += [[s for s in flats if isinstance(s, kind)] for kind in (Plane, Disk)]
-            sharp = focused_about(z, self.rays, trials.seed, self.scorer.threads)
-            kinds += [] if sharp is None else [[sharp]]
-            kinds += [trials.hemispheres(z), trials.domes(z)]
+            kinds += [*self.flat_kinds(z), trials.hemispheres(z), trials.domes(z)]
         kinds += filter(None, [trials.spheres(), trials.cylinders(), trials.boxes()])
         finalists = self.finals([self.best(kind) for kind in kinds])
         able = [f for f in finalists if f.held_out.unmet <= self.most_unmet]
         # Closed surfaces are sized without strays: where these are more, and nothing takes them up, what takes up most does.
         least = min(f.held_out.unmet for f in finalists) + self.settings.most_unmet
         able = able or [f for f in finalists if f.held_out.unmet <= least]
-        winner = able[0]
-        for challenger in able[1:]:
-            if challenger.held_out.leads(winner.held_out, self.settings):
-                winner = challenger
+        winner = self.simplest(able)
+        if (aside := self.aside(winner)) is not None:
+            winner, depths = aside
+            finalists, able = [winner, *finalists], [winner, *able]
         table = _table(finalists, winner)
         others = sorted((f for f in able if f is not winner), key=lambda f: -f.mean)
         notes = tuple(self.notes(winner, table, depths))
         return SurfaceChoice(winner.surface, table, depths, notes, tuple(f.surface for f in others))
+
+    def flat_kinds(self, z: float) -> list[Sequence[Plane | Disk]]:
+        """Rectangles and disks at a depth, and the rectangle in focus, if there is one."""
+        flats = self.trials.flats(z)
+        kinds: list[Sequence[Plane | Disk]] = [[s for s in flats if isinstance(s, kind)] for kind in (Plane, Disk)]
+        sharp = focused_about(z, self.rays, self.trials.seed, self.scorer.threads)
+        return kinds if sharp is None else [*kinds, [sharp]]
+
+    def simplest(self, able: Sequence[_Scored]) -> _Scored:
+        """The first one that no later one surpasses for sure."""
+        winner = able[0]
+        for challenger in able[1:]:
+            if challenger.held_out.leads(winner.held_out, self.settings):
+                winner = challenger
+        return winner
 
     def best(self, kind: Sequence[Surface]) -> Surface:
         """Of surfaces of one kind the best; of those that meet enough of the flux, if there are any."""
@@ -309,46 +322,54 @@ class _Search:
         yield from self.notes_of_front(winner)
 
     def notes_of_front(self, winner: _Scored) -> Iterator[str]:
-        """What is to be said of a source that looks aside: whether it would be sharper on a flat surface of its own."""
-        trials, aslant = self.trials, self.settings.aslant
-        mean = mean_direction(trials.direction, trials.rays.flux)
-        length = float(np.linalg.norm(mean))
-        if length <= aslant:
-            return
-        normal = start_normal(trials.position, mean)
-        flat = isinstance(winner.surface, Plane | Disk | Hemisphere | Dome)
-        front = normal if normal is not None else mean / length
-        turn = turn_upright(front)
-        towards = "({:.2f}, {:.2f}, {:.2f})".format(*(front + 0.0))
-        if turn.angle > self.settings.least_tilt and (normal is not None or not flat):
-            turned = self.flat_when(turn)
-            if turned is not None and turned.held_out.leads(winner.held_out, self.settings):
-                lead, error = turned.held_out.score.lead(winner.held_out.score)
-                yield (
-                    f"the source looks towards {towards}: turned so that it looks towards +Z ({turn.option}, in Python "
-                    f"{turn.told}), a {turned.surface.NAME} predicts rays held out of the fit better by {lead:.4f} ± "
-                    f"{error:.4f}; a light field of the turned rays is sharper"
-                )
-                return
-        if mean[2] < aslant * length:
+        """What is to be said of a source that looks aside, and has no flat surface that does so too."""
+        mean = mean_direction(self.trials.direction, self.trials.rays.flux)
+        length, aslant = float(np.linalg.norm(mean)), self.settings.aslant
+        looks = getattr(winner.surface, "towards", None) is not None
+        if aslant < length and mean[2] < aslant * length and not looks:
+            towards = "({:.2f}, {:.2f}, {:.2f})".format(*(mean / length + 0.0))
             yield (
-                f"the light heads towards {towards} on average; planes, disks, hemispheres and domes shine towards +Z: if "
-                "one of these would suit the source, turn the rays (etendue convert --rotate, in Python rays.rotated)"
+                f"the light heads towards {towards} on average; hemispheres and domes shine towards +Z: if one of these "
+                "would suit the source, turn the rays (etendue convert --rotate, in Python rays.rotated)"
             )
 
-    def flat_when(self, turn: Turn) -> _Scored | None:
-        """The best rectangle or disk of the turned rays, scored on the same ones as the surfaces of these; None if none is.
+    # --- sources that look aside -----------------------------------------------------------------------------------------
 
-        Nothing that is compared changes where everything is turned: neither densities in étendue nor who is held out.
+    def aside(self, winner: _Scored) -> tuple[_Scored, tuple[float, float]] | None:
+        """A flat surface that emits where the source looks, if it is better for sure than what was found; and its depths.
+
+        Where it looks is told exactly by the plane on which rays start, if they do, and else about by their mean direction.
         """
-        search = _Search(self.rays.rotated(*turn), self.trials.seed, self.scorer.threads, self.settings, self.step)
+        trials, settings = self.trials, self.settings
+        mean = mean_direction(trials.direction, trials.rays.flux)
+        length = float(np.linalg.norm(mean))
+        if length <= settings.aslant:
+            return None
+        normal = start_normal(trials.position, mean)
+        towards = direction_found(mean / length if normal is None else normal)
+        flat = isinstance(winner.surface, Plane | Disk | Hemisphere | Dome)
+        if towards is None or (normal is None and flat) or shortest_turn(towards)[1] <= settings.least_tilt:
+            return None
+        found = self.flat_aside(towards)
+        return found if found is not None and found[0].held_out.leads(winner.held_out, settings) else None
+
+    def flat_aside(self, towards: Triple) -> tuple[_Scored, tuple[float, float]] | None:
+        """The best flat surface that emits in a direction, and its depths; None if none takes up the light.
+
+        Sought among the rays as they are for whoever looks there. Nothing that is compared changes where everything is
+        turned: neither densities in étendue nor who is held out.
+        """
+        search = _Search(upright(self.rays, towards), self.trials.seed, self.scorer.threads, self.settings, self.step)
         if np.count_nonzero(search.trials.up) < FEWEST:
             return None
-        z, _ = search.depth()
-        flats = search.trials.flats(z)
-        kinds = [[s for s in flats if isinstance(s, kind)] for kind in (Plane, Disk)]
+        z, depths = search.depth()
+        kinds = search.flat_kinds(z)
         found = [f for f in search.finals([search.best(k) for k in kinds]) if f.held_out.unmet <= search.most_unmet]
-        return max(found, key=lambda f: f.mean, default=None)
+        if not found:
+            return None
+        best = search.simplest(found)
+        assert isinstance(best.surface, Plane | Disk)  # noqa: S101 - flat kinds are
+        return _Scored(dataclasses.replace(best.surface, towards=towards), best.held_out), depths
 
 
 def told_apart(low: float, high: float) -> tuple[str, str]:
