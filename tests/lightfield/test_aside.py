@@ -51,7 +51,7 @@ def test_the_field_of_turned_rays_is_the_turned_field(found: bool) -> None:
     assert (first.values > 0.0).mean() > 0.3
     off = np.abs(second.values - first.values)
     assert np.quantile(off, 0.98) < near * first.values.max()
-    # Pixels at the edge of a disk that is found notice its last digits, where there are more points for one and not the other:
-    # what points tell of an edge is in their errors.
+    # Pixels at the edge of a disk that is found notice its last digits: there are more points for one and not the other, and
+    # what they tell of an edge is in the errors.
     stated = np.hypot(first.standard_error, second.standard_error)
     assert (off <= (stated if found else near * first.values.max())).all()
