@@ -5,11 +5,11 @@ from __future__ import annotations
 import etendue as et
 import numpy as np
 import pytest
-from etendue.lightfield.carrier.towards import shortest_turn
 from oracles.sources import PrismaticFilm
 
 TOWARDS = (0.5, -0.3, -0.6)
-TURN = shortest_turn(TOWARDS)
+TURN = np.array([0.3, 0.5, 0.0]), float(np.degrees(np.arctan2(np.hypot(0.5, 0.3), -0.6)))
+"""About ẑ × TOWARDS, by the angle between them."""
 DISK = {"radius": 11.2, "centre": (0.9, -0.5)}
 
 

@@ -65,7 +65,7 @@ def test_a_flat_surface_that_looks_aside_is_the_upright_one_turned(towards: tupl
     rays = et.RaySet(position, direction, np.ones(4000))
     unit = np.array(towards) / np.linalg.norm(towards)
     axis = np.cross([0, 0, 1], unit)
-    about = axis if axis.any() else [1.0, 0.0, 0.0]
+    about = axis if axis.any() else [0.0, 1.0, 0.0]
     turned = rays.rotated(about, float(np.degrees(np.arctan2(np.linalg.norm(axis), unit[2]))))
     plane = et.Plane(0.7, 2.5, 1.5, (0.1, -0.4), (0.2, -0.1, 0.3, 0.0), 2, 9.0)
     for upright in (plane, et.Disk(radius=1.3, z=-0.2, centre=(0.5, 1 / 7))):

@@ -15,6 +15,7 @@ from pydantic import model_validator
 from etendue.description.keys import Description
 from etendue.description.values import Number, Point, Vector
 from etendue.quantities.observer import cos_sin_degrees
+from etendue.quantities.vectors import shortest_rotation, unit
 
 Array = npt.NDArray[np.float64]
 
@@ -124,7 +125,7 @@ class Placement(Description):
         """Local coordinates in the world."""
         axes = UPRIGHT
         if self.toward is not None:
-            axes = _shortest_rotation(np.asarray(self.toward))
+            axes = shortest_rotation(self.toward)
         elif self.axis is not None and self.angle is not None:
             axes = _turn(np.asarray(self.axis), self.angle)
         elif self.rotation is not None:
@@ -136,19 +137,6 @@ class Placement(Description):
         return Frame(np.asarray(self.at), axes if axes is UPRIGHT else axes + 0.0)
 
 
-def unit(vector: npt.ArrayLike) -> Array:
-    """A vector of any length as a unit vector, without overflow, shape (3,).
-
-    Examples
-    --------
-    >>> unit((0, 3e200, 4e200)).tolist()
-    [0.0, 0.6, 0.8]
-    """
-    scaled = np.asarray(vector, dtype=np.float64) / np.abs(vector).max()
-    direction: Array = scaled / np.linalg.norm(scaled)
-    return direction
-
-
 def _turn(axis: Array, angle: float) -> Array:
     """Rodrigues' formula; exact about the coordinate axes at quarter turns."""
     c, s = cos_sin_degrees(angle)
@@ -158,17 +146,3 @@ def _turn(axis: Array, angle: float) -> Array:
     outer = np.outer((x, y, z), (x, y, z))
     turned: Array = outer + c * (np.eye(3) - outer) + s * cross
     return turned
-
-
-def _shortest_rotation(toward: Array) -> Array:
-    """Rz(φ) Ry(θ) Rz(-φ): takes +Z to the direction (θ, φ); see `etendue.quantities.observer.Observer`."""
-    x, y, ct = unit(toward)
-    st = math.hypot(x, y)
-    c, s = (x / st, y / st) if st > 0.0 else (1.0, 0.0)
-    return np.array(
-        [
-            [ct * c * c + s * s, (ct - 1.0) * c * s, st * c],
-            [(ct - 1.0) * c * s, ct * s * s + c * c, st * s],
-            [-st * c, -st * s, ct],
-        ]
-    )

@@ -8,9 +8,9 @@ from types import MappingProxyType
 import numpy as np
 
 from etendue.lightfield.carrier.part import WORLD, Part, Triple
-from etendue.lightfield.carrier.sizing import hits_upwards, radius_for, sizing_rays
+from etendue.lightfield.carrier.sizing import hits_upwards, radius_for
 from etendue.lightfield.carrier.surface import Surface
-from etendue.lightfield.carrier.towards import checked_towards, turned, upright
+from etendue.lightfield.carrier.towards import checked_towards, turned
 from etendue.quantities.ray_stream import RayStream
 
 
@@ -28,7 +28,7 @@ class Disk(Surface):
         (x, y) [mm]
     towards : tuple of 3 floats, optional
         Direction that it emits towards; None: +Z. All else is as it was before the surface was turned there about the
-        origin, by the shortest way from +Z: `z` is then its distance from the origin along `towards`.
+        origin, by the shortest rotation from +Z (to -Z about Y): `z` is then its distance from the origin along `towards`.
 
     Raises
     ------
@@ -67,8 +67,5 @@ class Disk(Surface):
         """The smallest disk that the rays' lines cross, but for strays far off."""
         if not self.open_dimensions:
             return self
-        if self.towards is not None:
-            sized = dataclasses.replace(self, towards=None).sized_for(upright(sizing_rays(rays), self.towards))
-            return dataclasses.replace(sized, towards=self.towards)
-        hits, _ = hits_upwards(rays, self.z, "Disk")
+        hits, _ = hits_upwards(rays, self.z, "Disk", towards=self.towards)
         return dataclasses.replace(self, radius=radius_for(np.hypot(*(hits - self.centre).T)))

@@ -7,10 +7,10 @@ from types import MappingProxyType
 
 from etendue.errors import ArgumentError
 from etendue.lightfield.carrier.part import FLAT, WORLD, Focus, Part, Triple
-from etendue.lightfield.carrier.sizing import SLACK, extent, hits_upwards, sizing_rays
+from etendue.lightfield.carrier.sizing import SLACK, extent, hits_upwards
 from etendue.lightfield.carrier.sphere import Sphere
 from etendue.lightfield.carrier.surface import Surface
-from etendue.lightfield.carrier.towards import checked_towards, turned, upright
+from etendue.lightfield.carrier.towards import checked_towards, turned
 from etendue.quantities.arguments import require_number
 from etendue.quantities.ray_stream import RayStream
 
@@ -43,7 +43,7 @@ class Plane(Surface):
         beside. None: it is not in the field.
     towards : tuple of 3 floats, optional
         Direction that it emits towards; None: +Z. All else is as it was before the surface was turned there about the
-        origin, by the shortest way from +Z: `z` is then its distance from the origin along `towards`.
+        origin, by the shortest rotation from +Z (to -Z about Y): `z` is then its distance from the origin along `towards`.
 
     Raises
     ------
@@ -104,10 +104,7 @@ class Plane(Surface):
         """The smallest rectangle that the rays' lines cross, but for strays far off; of a stated size, where most do."""
         if not self.open_dimensions:
             return self
-        if self.towards is not None:
-            sized = dataclasses.replace(self, towards=None).sized_for(upright(sizing_rays(rays), self.towards))
-            return dataclasses.replace(sized, towards=self.towards)
-        hits, flux = hits_upwards(rays, self.z, "Plane", self.focus or FLAT)
+        hits, flux = hits_upwards(rays, self.z, "Plane", self.focus or FLAT, self.towards)
         sizes, centres = (self.width, self.height), self.centre or (None, None)
         spans = [extent(v, flux, c, size) for v, c, size in zip(hits.T, centres, sizes, strict=True)]
         centre = tuple((low + high) / 2 for low, high in spans)

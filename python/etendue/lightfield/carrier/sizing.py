@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from etendue.errors import ArgumentError
 from etendue.lightfield.carrier.part import FLAT, Focus, Triple
+from etendue.lightfield.carrier.towards import upright
 from etendue.lightfield.pilot_sample import pilot_sample
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
@@ -40,8 +41,12 @@ def sizing_rays(rays: RayStream) -> RaySet:
     return pilot_sample(rays, PILOT_RAYS)
 
 
-def hits_upwards(rays: RayStream, z: float, name: str, focus: Focus = FLAT) -> tuple[FloatArray, FloatArray]:
+def hits_upwards(
+    rays: RayStream, z: float, name: str, focus: Focus = FLAT, towards: Triple | None = None
+) -> tuple[FloatArray, FloatArray]:
     """Places on a height, taken at its focus, of rays that head towards +Z [mm], shape (m, 2), and their flux, (m,).
+
+    If a direction is given, it is upwards in place of +Z (see `etendue.lightfield.carrier.towards`).
 
     Raises
     ------
@@ -55,10 +60,11 @@ def hits_upwards(rays: RayStream, z: float, name: str, focus: Focus = FLAT) -> t
     >>> hits_upwards(rays, 4.0, "Plane")[0].tolist()
     [[3.0, 0.0]]
     """
-    some = sizing_rays(rays)
+    some = sizing_rays(rays) if towards is None else upright(sizing_rays(rays), towards)
     up = np.flatnonzero(some.direction[:, 2] > 0)
     if not len(up):
-        raise ArgumentError(f"{name}: no ray heads towards +Z; turn the rays, or choose a sphere or cylinder.")
+        there = "+Z" if towards is None else towards
+        raise ArgumentError(f"{name}: no ray heads towards {there}; turn the rays, or choose a sphere or cylinder.")
     x, k = some.position[up], some.direction[up]
     sharp = z + np.polynomial.polynomial.polyval(1.0 - k[:, 2], focus)
     hits: FloatArray = x[:, :2] + ((sharp - x[:, 2]) / k[:, 2])[:, None] * k[:, :2]

@@ -13,7 +13,7 @@ from etendue.errors import ArgumentError
 from etendue.lightfield.carrier import Disk, Dome, Hemisphere, Plane, Surface
 from etendue.lightfield.carrier.part import Triple
 from etendue.lightfield.carrier.sizing import SLACK
-from etendue.lightfield.carrier.towards import direction_found, shortest_turn, upright
+from etendue.lightfield.carrier.towards import direction_found, upright
 from etendue.lightfield.focusing import focused_about
 from etendue.lightfield.pilot_sample import FEWEST, even_density, pilot_sample
 from etendue.lightfield.selection.front import mean_direction, start_normal
@@ -348,7 +348,9 @@ class _Search:
         normal = start_normal(trials.position, mean)
         towards = direction_found(mean / length if normal is None else normal)
         flat = isinstance(winner.surface, Plane | Disk | Hemisphere | Dome)
-        if towards is None or (normal is None and flat) or shortest_turn(towards)[1] <= settings.least_tilt:
+        if towards is None or (normal is None and flat):
+            return None
+        if math.degrees(math.atan2(math.hypot(*towards[:2]), towards[2])) <= settings.least_tilt:
             return None
         found = self.flat_aside(towards)
         return found if found is not None and found[0].held_out.leads(winner.held_out, settings) else None

@@ -76,7 +76,9 @@ class SelectionSettings:
         Share of the flux towards −Z from which on surfaces that shine towards +Z alone are not tried.
     aslant : float
         Length of the mean direction from which on a source has a front, and the largest component of it along Z of a source
-        that looks aside. It decides whether a hint is given, and nothing else.
+        that looks aside.
+    least_tilt : float
+        Angle to +Z [°] from which on flat surfaces that look where the source does are tried.
 
     Examples
     --------
