@@ -35,6 +35,27 @@ def test_pixels_that_found_nothing_err_as_their_neighbours() -> None:
     assert np.mean(np.abs(z) > 3) < 0.01
 
 
+def test_the_edge_of_a_lamp_tells_nothing_of_dim_surfaces_beside_it() -> None:
+    """The variance of a dim pixel's mean is (1/p − 1)/n, whatever share of its neighbour a lamp 10⁵ times as bright covers.
+
+    Errors of single pixels rest on few finds; their mean square does not.
+    """
+    rng = np.random.default_rng(6)
+    dim = (rng.random((PASSES, SIDE, SIDE)) < 3 * SHARE) / (3 * SHARE)
+    direct = np.zeros_like(dim)
+    direct[:, :, 7::5] = 1e5 * rng.binomial(1, 0.4, (PASSES, SIDE, len(range(7, SIDE, 5))))
+    nothing, everywhere = np.zeros((SIDE, SIDE)), np.ones((SIDE, SIDE))
+    found = Passes((SIDE, SIDE), everywhere)
+    for scattered, seen in zip(dim, direct, strict=True):
+        found.add(scattered + seen, nothing, nothing, nothing, everywhere, scattered)
+    _, error = found.total(None)
+    lamp = direct.any(axis=0)
+    assert lamp.sum() > SIDE
+    known = (1 / (3 * SHARE) - 1) / PASSES
+    assert 1.0 < (error[~lamp] ** 2).mean() / known < 1.3
+    assert np.allclose(error[lamp], (dim + direct).std(axis=0, ddof=1)[lamp] / 4, rtol=1e-3, atol=0)
+
+
 def test_pixels_that_found_light_in_each_pass_err_by_their_own() -> None:
     """Whatever is beside them, and however few passes there are."""
     rng = np.random.default_rng(5)

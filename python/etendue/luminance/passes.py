@@ -84,7 +84,7 @@ class Passes:
         )
         self._all.add(values, self.done)
         self._rare.add(scattered)
-        self._lit += values > 0.0
+        self._lit += scattered > 0.0
         # Of nothing so far, nothing more changes neither mean nor spread.
         if chance.any() or self._lucky.any():
             self._chance.add(chance, self.done)
@@ -97,15 +97,17 @@ class Passes:
     def total(self, image: Forward | None, *, known: bool = True) -> tuple[Array, Array]:
         """The luminance of both routes and its standard error; with what the sources know of their own, if `known`.
 
-        What is found by chance, in few passes of a pixel, errs by no less than in its neighbourhood; so does all light of a
-        pixel that sees a diffuse surface and found light in few passes, and light that is scattered and rare (`RareLight`).
+        What is found by chance, in few passes of a pixel, errs by no less than in its neighbourhood; so does scattered light
+        of a pixel that sees a diffuse surface and found such light in few passes, and scattered light that is rare
+        (`RareLight`). The edge of a lamp beside a pixel tells nothing of it, and a lamp is brighter than what it lights.
         """
         chance, found = self._chance.variance(self.done), self._all.variance(self.done)
+        scattered = self._rare.variance()
         # Whoever found light in each pass needs no neighbours.
         lit = np.where(self._lit < self.done, self._lit, FEW)
-        variance = np.maximum(
-            found + (at_least_nearby(chance, self._lucky, self._smooth) - chance),
-            at_least_nearby(found, lit, self._diffuse),
+        variance = found + np.maximum(
+            at_least_nearby(chance, self._lucky, self._smooth) - chance,
+            at_least_nearby(scattered, lit, self._diffuse) - scattered,
         )
         variance = np.maximum(variance, self._rare.least_variance(self._diffuse))
         if known:

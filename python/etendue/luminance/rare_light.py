@@ -82,6 +82,12 @@ class RareLight:
         second += more
         mean += step
 
+    def variance(self) -> Array:
+        """Of the means of pixels, by their own passes."""
+        if self._moments is None:
+            return np.zeros(self._shape)
+        return self._moments[1] / (self._passes * (self._passes - 1))
+
     def least_variance(self, diffuse: npt.NDArray[np.bool_]) -> Array:
         """The least variances of the means of pixels, 0 where there is nothing to tell.
 
@@ -97,7 +103,7 @@ class RareLight:
         rare = second * second < RARE * fourth
         if not rare.any():
             return np.zeros(self._shape)
-        variance = second / (self._passes * (self._passes - 1))
+        variance = self.variance()
         beside = _mean_beside(variance, rare, _regular(self._moments, self._passes), possible)
         return np.where(possible, np.maximum(_median_beside(variance, rare), beside), 0.0)
 
