@@ -111,6 +111,7 @@ class _Part(TypedDict):
     z: Sequence[float]
     size: Sequence[float]
     focus: Sequence[float]
+    beam: Sequence[float]
 
 class _FieldPart(TypedDict):
     part: _Part

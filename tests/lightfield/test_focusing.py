@@ -302,7 +302,7 @@ def test_bad_planes_are_told() -> None:
 
 
 def test_pixels_of_patches_need_a_flat_plane(rays: et.RaySet) -> None:
-    with pytest.raises(et.ArgumentError, match="without focus and frames"):
+    with pytest.raises(et.ArgumentError, match="without focus, frames and beam"):
         et.GriddedSource.fit(rays, SMALL, pixel=0.5, threshold=5)
 
 

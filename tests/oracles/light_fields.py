@@ -14,8 +14,9 @@ from etendue.units import FluxUnit
 SURFACES: dict[str, Surface] = {
     "plane": Plane(z=0.7, width=2.5, height=1 / 3, centre=(0.1, -0.4)),
     "disk": Disk(radius=1.3, z=-0.2, centre=(0.5, 1 / 7)),
+    "plane with a beam": Plane(0.7, 2.5, 1 / 3, (0.1, -0.4), beam=(0.2, -0.35, 0.4)),
     "plane aslant": Plane(0.4, 2.5, 1.5, (0.1, -0.4), (0.2, -0.1, 0.3, 0.0), towards=(-0.3, 0.3, 0.7)),
-    "disk aslant": Disk(radius=1.3, z=-0.2, centre=(0.5, 1 / 7), towards=(-0.5, 0.1, 0.6)),
+    "disk aslant with a beam": Disk(1.3, -0.2, (0.5, 1 / 7), beam=(-0.3, 0.1, 0.6), towards=(-0.5, 0.1, 0.6)),
     "hemisphere": Hemisphere(radius=1.264, centre=(0.1, 0.2, -0.3)),
     "sphere": Sphere(radius=0.9, centre=(-0.3, 0.0, 0.2)),
     "cylinder": Cylinder(radius=0.8, bottom=-0.1, top=1.7, centre=(0.2, -0.1)),

@@ -1,6 +1,6 @@
 //! Carrier surfaces and the coordinates of rays on them.
 
-use etendue_lightfield::carrier::{CarrierPart, Disk, Focus, Hemisphere, Rectangle, Shape, Tube};
+use etendue_lightfield::carrier::{Beam, CarrierPart, Disk, Focus, Hemisphere, Rectangle, Shape, Tube};
 use etendue_math::{Frame, Vec3};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -17,6 +17,7 @@ pub struct Part {
     z: [f64; 3],
     size: [f64; 2],
     focus: [f64; 4],
+    beam: [f64; 3],
 }
 
 impl Part {
@@ -40,7 +41,10 @@ impl Part {
             y: self.y.into(),
             z: self.z.into(),
         };
-        Ok(CarrierPart { frame, shape })
+        let [p, q, radius] = self.beam;
+        let beam = Beam::new([p, q], radius)
+            .ok_or_else(|| PyValueError::new_err("a beam has to be a disk within that of all direction cosines"))?;
+        Ok(CarrierPart { frame, shape, beam })
     }
 }
 

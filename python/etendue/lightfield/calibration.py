@@ -185,7 +185,7 @@ def _squares(values: FloatArray, side: int) -> FloatArray:
 
 
 def _uses_images(estimate: PartEstimate) -> bool:
-    return estimate.recipe != "uniform" or estimate.chart.hole > 0.0
+    return estimate.recipe != "uniform" or estimate.chart.is_shared
 
 
 def _shown(estimate: PartEstimate, threads: int | None) -> FloatArray:
@@ -219,12 +219,14 @@ def _elsewhere(found: PartEstimate, counts: PartCounts, symmetry: str, threads: 
             sums.map(np.roll, _fine_steps(s, n, sums.weight.shape[0]), (0, 1))
             for sums, s, n in ((counts.space, shift[:2], shape[:2]), (counts.direction, shift[2:], shape[2:]))
         ]
-        whole = dataclasses.replace(found.chart, hole=0.0)
-        there = images_of(PartCounts(counts.grid, *fine), whole, threads, positions=KNOWN_POSITIONS, like=found.images)
+        there = images_of(
+            PartCounts(counts.grid, *fine), found.chart.whole, threads, positions=KNOWN_POSITIONS, like=found.images
+        )
         images = there.rolled(tuple(-s for s in shift), shape)
-        if found.images.space is not None and images.space is not None:
-            # The rolled image is floored; where nothing can be, nothing is drawn.
-            images = Base(np.where(found.images.space > 0, images.space, 0.0), images.direction)
+        # The rolled images are floored; where nothing can be, nothing is drawn.
+        images = Base(
+            _where_lit(images.space, found.images.space), _where_lit(images.direction, found.images.direction)
+        )
     else:
         images = found.images
     base = base_of(found.chart, found.recipe, images)
@@ -235,6 +237,10 @@ def _elsewhere(found: PartEstimate, counts: PartCounts, symmetry: str, threads: 
     unsure = np.divide(tree.deviation, tree.ratio, out=np.zeros_like(tree.ratio), where=tree.ratio > 0) ** 2
     mass = sum_of_images(_shown(known, threads) / (1.0 + unsure) ** 2, symmetry)
     return mass / mass.sum(), Base(known.unit.space, known.unit.direction)
+
+
+def _where_lit(density: FloatArray | None, like: FloatArray | None) -> FloatArray | None:
+    return density if density is None or like is None else np.where(like > 0, density, 0.0)
 
 
 def _fine_steps(shift: tuple[int, ...], shape: tuple[int, ...], fine: int) -> list[int]:

@@ -89,8 +89,8 @@ def images_of(
     """Densities over the place and over the direction: what the fine counts tell, each by itself.
 
     Either is a tree of its own, averaged over positions of the fine grid; what that takes from the top of a smooth lobe of
-    directions is put back, unless it shall not be. Where the part has a hole, nothing is left. The concentrations are those
-    of greatest evidence, or those of other images of the same light.
+    directions is put back, unless it shall not be. Where other parts take all light first, nothing is left. The
+    concentrations are those of greatest evidence, or those of other images of the same light.
     """
     if counts.space.rays == 0:
         return Images()
@@ -105,7 +105,6 @@ def images_of(
     known = None if like is None else like.concentrations
     of_place, of_turn = known or (concentration(counts.space), concentration(counts.direction))
     (space, of_space), (direction, of_direction) = density(counts.space, of_place), density(counts.direction, of_turn)
-    inside = space * _outside(len(space), chart.hole)
     if unflattened:
         # The tree of what the found image brings on average is flatter than it by about as much as it is than the light:
         # twicing, [Tukey1977]_.
@@ -115,7 +114,8 @@ def images_of(
         direction, of_direction = direction * factor, of_direction * factor
         level = direction.mean()
         direction, of_direction = direction / level, of_direction / level
-    return Images(inside, direction, of_space, of_direction, (of_place, of_turn))
+    space, direction = space * _outside(len(space), chart.hole), direction * _not_taken(len(direction), chart)
+    return Images(space, direction, of_space, of_direction, (of_place, of_turn))
 
 
 def _smooth_ratio(density: FloatArray, other: FloatArray) -> FloatArray:
@@ -132,6 +132,24 @@ def _outside(n: int, hole: float) -> FloatArray:
     """1 at the centres of those of n × n cells that lie outside a hole of this share of the sides, 0 within."""
     beside = np.abs((np.arange(n) + 0.5) / n - 0.5) >= hole / 2.0
     return (beside[:, None] | beside[None, :]).astype(np.float64)
+
+
+@functools.lru_cache(maxsize=8)
+def _not_taken(n: int, chart: Part) -> FloatArray:
+    """1 in those of n × n cells of direction of which other parts do not take all light first, 0 in the others."""
+    p, q, radius = chart.taken
+    if radius == 0.0:
+        return np.ones((n, n))
+    # A cell lies within the disk, which is convex, if its corners and the middles of its sides do.
+    steps = np.arange(2 * n + 1) / (2.0 * n)
+    a, b = np.meshgrid(steps, steps, indexing="ij")
+    middle = np.full(a.size, 0.5)
+    _, k = _core.rays_of_part(chart.core(), np.column_stack([middle, middle, a.ravel(), b.ravel()]))
+    x, y = (k @ np.array(axis) for axis in chart.axes[:2])
+    beside = (np.hypot(x - p, y - q) > radius).reshape(a.shape)
+    parts = (beside[i : i + 2 * n - 1 : 2, j : j + 2 * n - 1 : 2] for i in range(3) for j in range(3))
+    left: FloatArray = np.any(list(parts), axis=0).astype(np.float64)
+    return left
 
 
 def grow_symmetric(
@@ -183,7 +201,7 @@ class PartEstimate:
         """The field, up to a factor."""
         ratio, deviation = (node_values(v).astype(np.float32) for v in (self.tree.ratio, self.tree.deviation))
         field = PartField(ratio, deviation, self.base.space, self.base.direction, 1.0, self.errors)
-        if RECIPES[self.recipe].scaled or self.chart.hole:
+        if RECIPES[self.recipe].scaled or self.chart.is_shared:
             return scaled(field, self.images, self.chart.shape == "tube")
         return field
 
@@ -194,8 +212,8 @@ class PartEstimate:
 
 
 def base_of(chart: Part, recipe: str, images: Base) -> Base:
-    """The base measure of a recipe's tree; around a hole it is that of the images, which know of it."""
-    return images if RECIPES[recipe].product or chart.hole else Base()
+    """The base measure of a recipe's tree; where other parts take light first it is that of the images, which know of it."""
+    return images if RECIPES[recipe].product or chart.is_shared else Base()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -131,7 +131,8 @@ def _read(field: LightField, points: int, threads: int | None) -> Iterator[tuple
     charts = field.surface.parts()
     whole = sum(chart.etendue for chart in charts)
     for chart in charts:
-        n = max(round(points * chart.etendue / whole), 1)
+        # Half of the points go to each part alike: a narrow beam has little étendue and much of the light.
+        n = max(round(points * (chart.etendue / whole + 1.0 / len(charts)) / 2.0), 1)
         for start in range(0, n, BATCH):
             coordinates = _lattice(start, min(start + BATCH, n))
             x, k = _core.rays_of_part(chart.core(), coordinates)

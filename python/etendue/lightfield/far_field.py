@@ -124,14 +124,15 @@ def _shared(nodes: Nodes, direction: Array, flux: Array) -> tuple[Array, Array]:
 
 def _broadened(field: EtendueDensity, found: Intensity) -> list[str]:
     """What is to be said of a beam that is hardly wider than the field's own cells of direction."""
-    cells = max(
-        max(part.ratio.shape[2] * part.ratio.shape[3], 0 if part.direction is None else part.direction.size)
-        for part in field.parts
+    finest, cells = min(
+        (math.pi * chart.beam[2] ** 2 / n, n)
+        for chart, part in zip(field.surface.parts(), field.parts, strict=True)
+        for n in [max(part.ratio.shape[2] * part.ratio.shape[3], 0 if part.direction is None else part.direction.size)]
     )
     if not found.maximum > 0.0:
         return []
     beam = field.total_flux / found.maximum
-    filled = beam / (math.pi / cells)
+    filled = beam / finest
     if filled >= BROADENED:
         return []
     told = f"the beam fills no more than {max(filled, 1.0):.2g} of the light field's {cells:,} cells of direction"

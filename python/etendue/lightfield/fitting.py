@@ -11,6 +11,7 @@ import numpy as np
 
 from etendue.concurrency import on_one_blas_thread
 from etendue.errors import ArgumentError
+from etendue.lightfield.beam_search import with_beam
 from etendue.lightfield.calibration import calibrate
 from etendue.lightfield.candidate import (
     FINE_POSITIONS,
@@ -25,7 +26,7 @@ from etendue.lightfield.candidate import (
     grow_candidates,
     score_densities,
 )
-from etendue.lightfield.carrier import Plane, Surface
+from etendue.lightfield.carrier import Disk, Plane, Surface
 from etendue.lightfield.close_lines import TOLD, blurred_share, crowding, told_of_blur
 from etendue.lightfield.counting import Depths, EtendueCounts, FloatArray, PartGrids, count_rays
 from etendue.lightfield.etendue_density import EtendueDensity, FitReport
@@ -158,6 +159,8 @@ def fit_light_field(
         field = _fit_on(rays, surface, symmetry, depths, max_resolution, seed, threads, told)
         return field, crowding(rays, field)
 
+    if isinstance(surface, Plane | Disk):
+        surface = with_beam(surface, rays, seed, threads, is_centred=symmetry != "none")
     field, crowded = fitted(surface)
     if others and blurred_share(crowded) >= TOLD:
         # Scores are means over all light: a surface that blurs some of it far too much may have the best one.

@@ -64,9 +64,9 @@ class Resolution:
         Pitch of spots on the surface that directions share, which the field shows with half their contrast along either
         side [mm]; along the longer one alone where the shorter has no room for two.
     direction : float
-        Pitch of beams that places share, likewise, near the normal [°].
+        Pitch of beams that places share, likewise, near the normal, or the middle of the beam if the part is for one [°].
     cell_place, cell_direction : float
-        Longer side of the cells of places [mm] and of directions near the normal [°]: structure that changes with place
+        Longer side of the cells of places [mm] and of directions there [°]: structure that changes with place
         and direction together is no finer than these.
     place_limit, direction_limit : {"rays", "cells"}
         What would resolve more: more rays, or finer cells of the images.
@@ -137,8 +137,9 @@ def resolution(field: EtendueDensity, *, seed: int = 1, threads: int | None = No
     n1, n2, n3, n4 = part.ratio.shape
     cells = (fine[0], fine[1]) if len(fine) == 2 else (min(n1, n2), min(n3, n4))
     images = marginals(part, cells, chart.shape == "tube")
-    # The square of all directions holds the π of all direction cosines.
-    square = math.degrees(math.sqrt(math.pi))
+    # The square of all directions holds the π of all direction cosines; a step of these is a larger angle off the normal.
+    u, v, radius = chart.beam
+    square = math.degrees(radius * math.sqrt(math.pi / (1.0 - u * u - v * v)))
     sides = chart.sides, (square, square)
 
     def contrasts(pitch: float) -> tuple[float, float]:
@@ -152,8 +153,8 @@ def resolution(field: EtendueDensity, *, seed: int = 1, threads: int | None = No
         space, direction = (Sums(sum_of_images(cells, symmetry), None) for cells in drawn)
         if not (space.rays and direction.rays):
             return 0.0, 0.0
-        counts, whole = PartCounts(space, space, direction), dataclasses.replace(chart, hole=0.0)
-        found = images_of(counts, whole, threads, symmetry, POSITIONS).densities()
+        counts = PartCounts(space, space, direction)
+        found = images_of(counts, chart.whole, threads, symmetry, POSITIONS).densities()
         over_place, over_direction = (_contrast(f, t, both) for f, t, both in zip(found, true, waves, strict=True))
         return over_place, over_direction
 

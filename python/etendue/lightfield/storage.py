@@ -60,7 +60,7 @@ CONTINUOUS, LINES = "continuous", "lines"
 
 MOST_WAVELENGTHS = 1 << 20
 
-LATER = ("focus", "hole")
+LATER = ("focus", "hole", "beam", "taken")
 """Attributes of a part that files of before they were kept lack."""
 
 FACTORS = ("space", "direction")

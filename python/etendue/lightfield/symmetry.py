@@ -200,6 +200,11 @@ def _images(counts: EtendueCounts, symmetry: str) -> tuple[Image, ...]:
             f"the surface {counts.surface.told} cannot carry the symmetry {symmetry}; planes, disks, hemispheres, spheres "
             "and domes can."
         )
+    if any(chart.beam[:2] != (0.0, 0.0) or chart.taken[:2] != (0.0, 0.0) for chart in charts):
+        raise ArgumentError(
+            f"the surface {counts.surface.told} cannot carry the symmetry {symmetry}; state a beam about the normal, "
+            "beam=0/0/<radius>, or none, beam=0/0/1."
+        )
     square = all(chart.shape != "rectangle" or math.isclose(*chart.size, rel_tol=1e-9) for chart in charts)
     even = all(g.depths[0] == g.depths[1] and g.depths[2] == g.depths[3] for g in counts.grids)
     if symmetry == "c4" and not (square and even):

@@ -51,7 +51,7 @@ fn carry_to<C: Chart>(chart: C, part: &CarrierPart, index: u32, batch: &RayBatch
     let [s1, s2, a, b] = heads_mut(&mut out.values, n);
     for i in 0..n {
         let (o, d) = part.localise(Vec3::new(px[i], py[i], pz[i]), Vec3::new(kx[i], ky[i], kz[i]));
-        let found = chart.cross(o, d);
+        let found = chart.cross(o, d).within(&part.beam);
         let take = found.met & (owner[i] == Coordinates::NONE);
         owner[i] = if take { index } else { owner[i] };
         s1[i] = if take { found.place[0] } else { s1[i] };

@@ -1,8 +1,8 @@
 //! What every chart of a carrier surface answers, in its own frame.
 
 use etendue_math::Vec3;
-use etendue_sampling::warp::disk_to_square;
 
+use super::beam::Beam;
 use super::focus::Focus;
 
 /// An equal-area chart of a shape in its frame: where lines leave it, and which line leaves at a place.
@@ -22,7 +22,7 @@ pub trait Chart: Copy {
     }
 
     /// Where the line through `o` along the unit vector `d` leaves the shape.
-    fn cross(&self, o: Vec3, d: Vec3) -> Departure;
+    fn cross(&self, o: Vec3, d: Vec3) -> Crossing;
 
     /// The point at a place, and the unit vector there whose cosines are p and q along the surface and `up` to the normal: the
     /// inverse of [`Chart::cross`].
@@ -39,21 +39,41 @@ pub struct Departure {
     pub met: bool,
     /// Chart coordinates (s₁, s₂).
     pub place: [f64; 2],
-    /// Concentric coordinates (a, b) of the local direction cosines.
+    /// Concentric coordinates (a, b) of the local direction cosines, within the beam that the part takes.
     pub direction: [f64; 2],
 }
 
-/// The departure of a line at a place, under the local direction cosines p and q.
+/// Where a line leaves a shape: chart coordinates of the place, and the local direction cosines p and q.
+#[derive(Clone, Copy, Debug)]
+pub struct Crossing {
+    met: bool,
+    place: [f64; 2],
+    cosines: [f64; 2],
+}
+
+impl Crossing {
+    /// The departure from a part that takes the directions of a beam.
+    #[inline(always)]
+    pub(super) fn within(self, beam: &Beam) -> Departure {
+        let [p, q] = self.cosines;
+        let (inside, direction) = beam.coordinates(p, q);
+        Departure {
+            met: self.met & inside,
+            place: self.place,
+            direction,
+        }
+    }
+}
+
+/// The crossing of a line at a place, under the local direction cosines p and q.
 #[inline(always)]
-pub(super) fn departure(inside: bool, place: (f64, f64), p: f64, q: f64) -> Departure {
+pub(super) fn crossing(inside: bool, place: (f64, f64), p: f64, q: f64) -> Crossing {
     let (s1, s2) = place;
-    let (a, b) = disk_to_square(p, q);
     let met = inside & (0.0..=1.0).contains(&s1) & (0.0..=1.0).contains(&s2);
-    // Rounding may carry a grazing direction out of the square by some 1e-16.
-    Departure {
+    Crossing {
         met,
         place: [s1, s2],
-        direction: [a.clamp(0.0, 1.0), b.clamp(0.0, 1.0)],
+        cosines: [p, q],
     }
 }
 

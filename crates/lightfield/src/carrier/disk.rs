@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use etendue_math::Vec3;
 use etendue_sampling::warp::{disk_to_square, square_to_disk};
 
-use super::chart::{Chart, Departure, Left, clamped, departure, left};
+use super::chart::{Chart, Crossing, Left, clamped, crossing, left};
 
 /// In the plane z = 0, centred, emitting towards +z.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,11 +28,11 @@ impl Chart for Disk {
     }
 
     #[inline(always)]
-    fn cross(&self, o: Vec3, d: Vec3) -> Departure {
+    fn cross(&self, o: Vec3, d: Vec3) -> Crossing {
         let t = -o.z / d.z;
         let (x, y) = ((o.x + t * d.x) / self.radius, (o.y + t * d.y) / self.radius);
         let inside = (d.z > 0.0) & (x * x + y * y <= 1.0);
-        departure(inside, clamped(disk_to_square(x, y)), d.x, d.y)
+        crossing(inside, clamped(disk_to_square(x, y)), d.x, d.y)
     }
 
     fn ray(&self, [s1, s2]: [f64; 2], [p, q, up]: [f64; 3]) -> (Vec3, Vec3) {

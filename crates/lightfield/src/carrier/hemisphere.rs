@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use etendue_math::Vec3;
 use etendue_sampling::warp::{disk_to_square, square_to_disk};
 
-use super::chart::{Chart, Departure, Left, clamped, departure, left};
+use super::chart::{Chart, Crossing, Left, clamped, crossing, left};
 
 /// The half z ≥ 0 of a sphere about the origin, emitting outwards.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +28,7 @@ impl Chart for Hemisphere {
     }
 
     #[inline(always)]
-    fn cross(&self, o: Vec3, d: Vec3) -> Departure {
+    fn cross(&self, o: Vec3, d: Vec3) -> Crossing {
         // From the point nearest the centre, so that a start point far away costs no digits.
         let near = o + d * -o.dot(d);
         let half_chord = self.radius * self.radius - near.dot(near);
@@ -39,7 +39,7 @@ impl Chart for Hemisphere {
         let shear = (d.x * n.x + d.y * n.y) * lift + d.z;
         let inside = (half_chord > 0.0) & (n.z >= 0.0);
         let place = clamped(disk_to_square(n.x * azimuthal, n.y * azimuthal));
-        departure(inside, place, d.x - n.x * shear, d.y - n.y * shear)
+        crossing(inside, place, d.x - n.x * shear, d.y - n.y * shear)
     }
 
     fn ray(&self, [s1, s2]: [f64; 2], [p, q, up]: [f64; 3]) -> (Vec3, Vec3) {

@@ -2,11 +2,13 @@
 //!
 //! A light field lives on a surface Σ in four coordinates, each from 0 to 1: (s₁, s₂) is the place on a part of Σ, by an
 //! equal-area chart, and (a, b) the direction, by the concentric map of its local direction cosines (p, q). Equal volumes
-//! in these coordinates are equal étendues: dU = dA dp dq = π A ds₁ ds₂ da db. Theory eq. 37.
+//! in these coordinates are equal étendues: dU = dA dp dq = π A ds₁ ds₂ da db, or π r² A of a part that takes the directions
+//! of a beam. Theory eq. 37.
 //!
-//! `chart`: what a shape answers; `rectangle`, `disk`, `hemisphere`, `tube`: the shapes; `focus`: depth by inclination; `part`: a
-//! shape and where it stands; `carry`: rays carried there; `leave`: lines that mostly miss it.
+//! `chart`: what a shape answers; `rectangle`, `disk`, `hemisphere`, `tube`: the shapes; `focus`: depth by inclination;
+//! `beam`: the directions that a part takes; `part`: a shape and where it stands; `carry`: rays carried there; `leave`: lines that mostly miss it.
 
+mod beam;
 mod carry;
 mod chart;
 mod disk;
@@ -19,6 +21,7 @@ mod rectangle;
 pub(crate) mod tests;
 mod tube;
 
+pub use beam::Beam;
 pub use carry::{Coordinates, carry};
 pub use chart::Departure;
 pub use disk::Disk;

@@ -1,8 +1,8 @@
 //! A part of a carrier surface: a shape, and where it stands.
 
 use etendue_math::{Frame, Vec3};
-use etendue_sampling::warp::square_to_disk;
 
+use super::beam::Beam;
 use super::chart::{Chart, Departure};
 use super::disk::Disk;
 use super::focus::Focus;
@@ -43,6 +43,8 @@ pub struct CarrierPart {
     pub frame: Frame,
     /// What it is.
     pub shape: Shape,
+    /// The directions that it takes.
+    pub beam: Beam,
 }
 
 impl CarrierPart {
@@ -71,10 +73,10 @@ impl CarrierPart {
         })
     }
 
-    /// Étendue \[mm² sr\] of all light that can leave the part: π times its area.
+    /// Étendue \[mm² sr\] of all light that can leave the part: its area, times π and the share of direction cosines that it takes.
     #[must_use]
     pub fn etendue(&self) -> f64 {
-        std::f64::consts::PI * self.area()
+        std::f64::consts::PI * self.beam.share() * self.area()
     }
 
     /// Whether the first coordinate closes upon itself.
@@ -101,7 +103,7 @@ impl CarrierPart {
     /// The cosine holds the change of depth with direction, so that cosine · area / distance² is the solid angle.
     #[must_use]
     pub fn seen_from(&self, place: [f64; 2], p: Vec3) -> Option<(Vec3, f64)> {
-        let (point, normal) = self.ray(place, [0.5, 0.5]);
+        let (point, normal) = self.stand(place);
         let away = p - point;
         let focus = self.focus();
         if focus == Focus::default() {
@@ -122,7 +124,7 @@ impl CarrierPart {
     #[must_use]
     pub fn cross(&self, position: Vec3, direction: Vec3) -> Departure {
         let (o, d) = self.localise(position, direction);
-        of_chart!(self.shape, chart => chart.cross(o, d))
+        of_chart!(self.shape, chart => chart.cross(o, d)).within(&self.beam)
     }
 
     /// A line in the coordinates of the part.
@@ -137,9 +139,17 @@ impl CarrierPart {
     /// The point at chart coordinates (s₁, s₂), and the direction at (a, b) there: the inverse of [`Self::cross`].
     #[must_use]
     pub fn ray(&self, place: [f64; 2], direction: [f64; 2]) -> (Vec3, Vec3) {
-        let (p, q) = square_to_disk(direction[0], direction[1]);
-        let up = (1.0 - p * p - q * q).max(0.0).sqrt();
-        let (point, k) = of_chart!(self.shape, chart => chart.ray(place, [p, q, up]));
+        self.leave_along(place, self.beam.cosines(direction))
+    }
+
+    /// The point at a place, and the normal there.
+    #[must_use]
+    pub fn stand(&self, place: [f64; 2]) -> (Vec3, Vec3) {
+        self.leave_along(place, [0.0, 0.0, 1.0])
+    }
+
+    fn leave_along(&self, place: [f64; 2], cosines: [f64; 3]) -> (Vec3, Vec3) {
+        let (point, k) = of_chart!(self.shape, chart => chart.ray(place, cosines));
         (self.frame.point_to_world(point), self.frame.direction_to_world(k))
     }
 }

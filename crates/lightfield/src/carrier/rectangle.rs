@@ -2,7 +2,7 @@
 
 use etendue_math::Vec3;
 
-use super::chart::{Chart, Departure, Left, departure, left};
+use super::chart::{Chart, Crossing, Left, crossing, left};
 use super::focus::Focus;
 
 /// About the plane z = 0, centred, emitting towards +z.
@@ -35,10 +35,10 @@ impl Chart for Rectangle {
     }
 
     #[inline(always)]
-    fn cross(&self, o: Vec3, d: Vec3) -> Departure {
+    fn cross(&self, o: Vec3, d: Vec3) -> Crossing {
         let t = (self.focus.at(d.z) - o.z) / d.z;
         let place = ((o.x + t * d.x) / self.width + 0.5, (o.y + t * d.y) / self.height + 0.5);
-        departure(d.z > 0.0, place, d.x, d.y)
+        crossing(d.z > 0.0, place, d.x, d.y)
     }
 
     fn ray(&self, [s1, s2]: [f64; 2], [p, q, up]: [f64; 3]) -> (Vec3, Vec3) {

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use etendue_math::Vec3;
 use etendue_math::trig::{atan_eighths, sin_cos_turns};
 
-use super::chart::{Chart, Departure, Left, departure, left};
+use super::chart::{Chart, Crossing, Left, crossing, left};
 
 /// About the z axis, centred, emitting outwards.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +30,7 @@ impl Chart for Tube {
     }
 
     #[inline(always)]
-    fn cross(&self, o: Vec3, d: Vec3) -> Departure {
+    fn cross(&self, o: Vec3, d: Vec3) -> Crossing {
         let across = d.x * d.x + d.y * d.y;
         let t = -(o.x * d.x + o.y * d.y) / across;
         let (x, y) = (o.x + t * d.x, o.y + t * d.y);
@@ -39,7 +39,7 @@ impl Chart for Tube {
         let (x, y) = ((o.x + t_out * d.x) / self.radius, (o.y + t_out * d.y) / self.radius);
         let z = o.z + t_out * d.z;
         let inside = (across > 0.0) & (half_chord > 0.0);
-        departure(inside, (turns(x, y), z / self.height + 0.5), d.y * x - d.x * y, d.z)
+        crossing(inside, (turns(x, y), z / self.height + 0.5), d.y * x - d.x * y, d.z)
     }
 
     fn ray(&self, [s1, s2]: [f64; 2], [p, q, up]: [f64; 3]) -> (Vec3, Vec3) {

@@ -53,7 +53,7 @@ struct Places {
 impl Places {
     fn new(field: &PartField, side: u32) -> Self {
         let middle = |i: u32| (f64::from(i) + 0.5) / f64::from(side);
-        let place = |(i, j)| field.part.ray([middle(i), middle(j)], [0.5, 0.5]);
+        let place = |(i, j)| field.part.stand([middle(i), middle(j)]);
         Self {
             points: (0..side)
                 .flat_map(|i| (0..side).map(move |j| (i, j)))

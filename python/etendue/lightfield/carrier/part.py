@@ -18,6 +18,13 @@ Triple = tuple[float, float, float]
 FLAT: Focus = (0.0, 0.0, 0.0, 0.0)
 """The focus of a part whose places lie in its plane whatever the direction."""
 
+Beam = tuple[float, float, float]
+
+ALL: Beam = (0.0, 0.0, 1.0)
+"""The beam of a part that takes all directions."""
+
+NO_BEAM: Beam = (0.0, 0.0, 0.0)
+
 WORLD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 """Axes of a part whose light heads towards +Z."""
 
@@ -50,6 +57,10 @@ class Part:
         direction alone leave étendue what it is: theory eq. 41.
     hole : float
         Share of both sides, about the middle, within which no ray is left for this part, as others take them first.
+    beam : tuple of 3 floats
+        The directions that the part takes: a disk of direction cosines along x and y, by its middle and its radius.
+    taken : tuple of 3 floats
+        Likewise the directions of which no ray is left for this part, as others take them first; of radius 0 if none.
 
     Examples
     --------
@@ -64,6 +75,18 @@ class Part:
     size: tuple[float, float]
     focus: Focus = FLAT
     hole: float = 0.0
+    beam: Beam = ALL
+    taken: Beam = NO_BEAM
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether other parts take some of its light first."""
+        return self.hole > 0.0 or self.taken[2] > 0.0
+
+    @property
+    def whole(self) -> Part:
+        """The part as it is where no others take any of its light."""
+        return dataclasses.replace(self, hole=0.0, taken=NO_BEAM)
 
     @property
     def area(self) -> float:
@@ -89,8 +112,8 @@ class Part:
 
     @property
     def etendue(self) -> float:
-        """π · area [mm² sr]: that of all light that can leave the part on one side."""
-        return math.pi * self.area
+        """That of all light that can leave the part on one side within its beam, π · radius² · area [mm² sr]."""
+        return math.pi * self.beam[2] ** 2 * self.area
 
     def core(self) -> _core._Part:
         """The part as the compiled core takes it."""
@@ -103,6 +126,7 @@ class Part:
             "z": z,
             "size": self.size,
             "focus": self.focus,
+            "beam": self.beam,
         }
 
 

@@ -6,7 +6,8 @@ import dataclasses
 from types import MappingProxyType
 
 from etendue.errors import ArgumentError
-from etendue.lightfield.carrier.part import FLAT, WORLD, Focus, Part, Triple
+from etendue.lightfield.carrier.beam import checked_beam, parted
+from etendue.lightfield.carrier.part import ALL, FLAT, WORLD, Beam, Focus, Part, Triple
 from etendue.lightfield.carrier.sizing import SLACK, extent, hits_upwards
 from etendue.lightfield.carrier.sphere import Sphere
 from etendue.lightfield.carrier.surface import Surface
@@ -41,6 +42,9 @@ class Plane(Surface):
     rest : float, optional
         Radius of a sphere about the middle [mm] that takes up all other lines: light that heads downwards, or comes from far
         beside. None: it is not in the field.
+    beam : tuple of 3 floats, optional
+        The directions of a beam, for which the rectangle has cells of direction of its own: a disk of direction cosines
+        along X and Y, by its middle and its radius. (0, 0, 1): there is none. None: none, but `LightField.fit` finds it.
     towards : tuple of 3 floats, optional
         Direction that it emits towards; None: +Z. All else is as it was before the surface was turned there about the
         origin, by the shortest rotation from +Z (to -Z about Y): `z` is then its distance from the origin along `towards`.
@@ -48,7 +52,8 @@ class Plane(Surface):
     Raises
     ------
     ArgumentError
-        If a number is not finite, a length is not above 0, a direction has none, or there are no such frames.
+        If a number is not finite, a length is not above 0, a direction has none, there are no such frames, or the beam is
+        not within the disk of all directions.
 
     Examples
     --------
@@ -56,13 +61,15 @@ class Plane(Surface):
     12.0
     >>> [part.size for part in Plane(z=0, width=4, height=3, centre=(0, 0), frames=2).parts()]
     [(4.0, 3.0), (8.0, 6.0), (16.0, 12.0)]
+    >>> [part.name for part in Plane(z=0, width=4, height=3, centre=(0, 0), beam=(0.1, 0, 0.2)).parts()]
+    ['beam', 'plane']
     >>> Plane(z=7, width=4, height=3, centre=(0, 0), towards=(1, 0, 0)).parts()[0].centre
     (7.0, 0.0, 0.0)
     """
 
     NAME = "plane"
     LENGTHS = ("width", "height", "rest")
-    SIZES = MappingProxyType({"centre": 2, "focus": len(FLAT), "towards": 3})
+    SIZES = MappingProxyType({"centre": 2, "focus": len(FLAT), "beam": len(ALL), "towards": 3})
     UNSAID = MappingProxyType({"frames": 0})
     z: float = 0.0
     width: float | None = None
@@ -71,6 +78,7 @@ class Plane(Surface):
     focus: Focus | None = None
     frames: int = 0
     rest: float | None = None
+    beam: Beam | None = None
     towards: Triple | None = None
 
     def __post_init__(self) -> None:
@@ -79,15 +87,16 @@ class Plane(Surface):
         if not (float(self.frames).is_integer() and 0 <= self.frames <= MOST_FRAMES):
             raise ArgumentError(f"Plane: frames is {self.frames!r}; give a whole number from 0 to {MOST_FRAMES}.")
         object.__setattr__(self, "frames", int(self.frames))
+        checked_beam(self.beam, "Plane")
         object.__setattr__(self, "towards", checked_towards(self.towards, "Plane"))
 
     @property
     def open_dimensions(self) -> tuple[str, ...]:
-        """All that are None but the focus, which is then flat, the rest, which is left out, and the direction +Z."""
-        return tuple(name for name in super().open_dimensions if name not in ("focus", "rest", "towards"))
+        """All that are None but the focus, which is then flat, the rest and the beam, which are left out, and +Z."""
+        return tuple(name for name in super().open_dimensions if name not in ("focus", "rest", "beam", "towards"))
 
     def parts(self) -> tuple[Part, ...]:
-        """The rectangle, then the frames from within, then both halves of the sphere."""
+        """The rectangle, first for the beam, then the frames from within, then both halves of the sphere."""
         width, height = self.closed("width"), self.closed("height")
         if self.centre is None:
             raise ArgumentError("Plane: centre is open; state it, or call sized_for(rays).")
@@ -98,7 +107,7 @@ class Plane(Surface):
             for k in range(1, self.frames + 1)
         )
         beyond = () if self.rest is None else Sphere(self.rest, centre).parts()
-        return tuple(turned(part, self.towards) for part in (window, *frames, *beyond))
+        return tuple(turned(part, self.towards) for part in (*parted(window, self.beam), *frames, *beyond))
 
     def sized_for(self, rays: RayStream) -> Plane:
         """The smallest rectangle that the rays' lines cross, but for strays far off; of a stated size, where most do."""

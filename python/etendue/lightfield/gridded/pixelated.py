@@ -12,7 +12,7 @@ import numpy as np
 
 from etendue.errors import ArgumentError
 from etendue.lightfield.carrier import Part, Surface
-from etendue.lightfield.carrier.part import FLAT
+from etendue.lightfield.carrier.part import ALL, FLAT
 from etendue.lightfield.gridded.curved_pixels import CylindricalPixels, SphericalPixels
 from etendue.lightfield.gridded.pixels import SLACK, Array, Cells, Indices, Pixelation, SquarePixels, flat_size
 from etendue.quantities.arguments import require, require_known, require_number
@@ -92,9 +92,9 @@ class PixelatedSurface:
             raise ArgumentError(f"pixel is {pixel!r}; give the side of a pixel in mm, above 0.")
         require_known(centre_on, CENTRES, "place of the lattice")
         parts = surface.parts()
-        if any(part.focus != FLAT or part.hole > 0.0 for part in parts):
+        if any(part.focus != FLAT or part.is_shared or part.beam != ALL for part in parts):
             raise ArgumentError(
-                f"pixels lie on surfaces without focus and frames, and {surface.told} has them; state it without."
+                f"pixels lie on surfaces without focus, frames and beam, and {surface.told} has them; state it without."
             )
         if parallels is not None:
             require(parallels, numbers.Integral, "parallels", "a whole number, 1 or more, or None")

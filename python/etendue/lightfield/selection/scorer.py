@@ -220,7 +220,7 @@ class SurfaceScorer:
         """
         found: list[list[Images]] = [[Images() for _ in parts] for _ in self.held_out]
         for index, (part, own) in enumerate(zip(parts, rays, strict=True)):
-            if part.hole == 0.0 and recipes == TREES_ALONE:
+            if not part.is_shared and recipes == TREES_ALONE:
                 continue
             shape = tuple(n // (COARSER if few[index] else 1) for n in IMAGE_SHAPE)
             cells = [_numbered(own.coordinates, axes, shape[axes]) for axes in (slice(0, 2), slice(2, 4))]

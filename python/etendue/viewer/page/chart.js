@@ -34,9 +34,32 @@ function turns(x, y) {
 }
 
 function departure(inside, s1, s2, p, q) {
-  if (!inside || !(s1 >= 0 && s1 <= 1 && s2 >= 0 && s2 <= 1)) return null;
-  const [a, b] = diskToSquare(p, q);
+  return inside && s1 >= 0 && s1 <= 1 && s2 >= 0 && s2 <= 1 ? [s1, s2, p, q] : null;
+}
+
+/** [s1, s2, a, b] of a crossing under the direction cosines p and q, or null if these are not in the beam. */
+function within([u, v, radius], crossing) {
+  if (!crossing) return null;
+  const [s1, s2, p, q] = crossing;
+  const [x, y] = [(p - u) / radius, (q - v) / radius];
+  if (radius < 1 && x * x + y * y > 1) return null;
+  const [a, b] = diskToSquare(x, y);
   return [s1, s2, clamp(a), clamp(b)];
+}
+
+function crossShape(chart, o, d) {
+  switch (chart.shape) {
+    case "rectangle":
+      return crossRectangle(chart.size, chart.focus, o, d);
+    case "disk":
+      return crossDisk(chart.size, o, d);
+    case "hemisphere":
+      return crossHemisphere(chart.size, o, d);
+    case "tube":
+      return crossTube(chart.size, o, d);
+    default:
+      throw new Error(`there is no chart of the shape ${chart.shape}`);
+  }
 }
 
 function crossRectangle([width, height], focus, o, d) {
@@ -91,19 +114,7 @@ export function turned(axes, v) {
  */
 export function cross(chart, point, direction) {
   const o = turned(chart.axes, point.map((x, i) => x - chart.centre[i]));
-  const d = turned(chart.axes, direction);
-  switch (chart.shape) {
-    case "rectangle":
-      return crossRectangle(chart.size, chart.focus, o, d);
-    case "disk":
-      return crossDisk(chart.size, o, d);
-    case "hemisphere":
-      return crossHemisphere(chart.size, o, d);
-    case "tube":
-      return crossTube(chart.size, o, d);
-    default:
-      throw new Error(`there is no chart of the shape ${chart.shape}`);
-  }
+  return within(chart.beam, crossShape(chart, o, turned(chart.axes, direction)));
 }
 
 export function areaOf({ shape, size: [width, height] }) {
@@ -120,7 +131,7 @@ export function areaOf({ shape, size: [width, height] }) {
  * The light that leaves a part at the place (s1, s2) along a unit vector `d` in the axes of the part: the cosine to the normal
  * there and [s1, s2, a, b], or null if it goes inwards.
  */
-export function departing({ shape }, [s1, s2], d) {
+export function departing({ shape, beam }, [s1, s2], d) {
   let [cosine, p, q] = [d[2], d[0], d[1]];
   if (shape === "hemisphere") {
     const [x, y] = squareToDisk(s1, s2);
@@ -135,6 +146,6 @@ export function departing({ shape }, [s1, s2], d) {
     cosine = d[0] * nx + d[1] * ny;
     [p, q] = [d[1] * nx - d[0] * ny, d[2]];
   }
-  const place = departure(cosine > 0, s1, s2, p, q);
+  const place = within(beam, departure(cosine > 0, s1, s2, p, q));
   return place && { cosine, place };
 }

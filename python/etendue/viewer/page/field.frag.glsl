@@ -78,20 +78,20 @@ vec2 diskToSquare(vec2 p) {
   return 0.5 * (wide ? square : square.yx) + 0.5;
 }
 
-// Where the line leaves a part: chart.js.
+// Where the line leaves a shape, and the direction cosines along it there: chart.js.
 bool crossing(int shape, vec2 extent, vec4 focus, vec3 o, vec3 d, out vec4 at) {
   if (shape == RECTANGLE) {
     if (d.z <= 0.0) return false;
     float lean = 1.0 - d.z;
     float depth = focus.x + lean * (focus.y + lean * (focus.z + lean * focus.w));
     vec2 place = (o.xy + (depth - o.z) / d.z * d.xy) / extent + 0.5;
-    at = vec4(place, clamp(diskToSquare(d.xy), 0.0, 1.0));
+    at = vec4(place, d.xy);
     return all(greaterThanEqual(place, vec2(0.0))) && all(lessThanEqual(place, vec2(1.0)));
   }
   if (shape == DISK) {
     if (d.z <= 0.0) return false;
     vec2 place = (o.xy - o.z / d.z * d.xy) / extent.x;
-    at = clamp(vec4(diskToSquare(place), diskToSquare(d.xy)), 0.0, 1.0);
+    at = vec4(clamp(diskToSquare(place), 0.0, 1.0), d.xy);
     return dot(place, place) <= 1.0;
   }
   if (shape == HEMISPHERE) {
@@ -100,7 +100,7 @@ bool crossing(int shape, vec2 extent, vec4 focus, vec3 o, vec3 d, out vec4 at) {
     vec3 n = (near + d * sqrt(max(halfChord, 0.0))) / extent.x;
     float lift = 1.0 / (1.0 + max(n.z, 0.0));
     float shear = dot(d.xy, n.xy) * lift + d.z;
-    at = clamp(vec4(diskToSquare(n.xy * sqrt(lift)), diskToSquare(d.xy - n.xy * shear)), 0.0, 1.0);
+    at = vec4(clamp(diskToSquare(n.xy * sqrt(lift)), 0.0, 1.0), d.xy - n.xy * shear);
     return halfChord > 0.0 && n.z >= 0.0;
   }
   float across = dot(d.xy, d.xy);
@@ -112,7 +112,7 @@ bool crossing(int shape, vec2 extent, vec4 focus, vec3 o, vec3 d, out vec4 at) {
   vec2 n = (o.xy + leaves * d.xy) / extent.x;
   float height = (o.z + leaves * d.z) / extent.y + 0.5;
   float turn = clamp(atan(n.y, n.x) / (8.0 * EIGHTH) + 0.5, 0.0, 1.0);
-  at = vec4(turn, height, clamp(diskToSquare(vec2(d.y * n.x - d.x * n.y, d.z)), 0.0, 1.0));
+  at = vec4(turn, height, d.y * n.x - d.x * n.y, d.z);
   return halfChord > 0.0 && height >= 0.0 && height <= 1.0;
 }
 
@@ -129,12 +129,16 @@ void main() {
     vec4 focus = texelFetch(parts, ivec2(4, i), 0);
     vec4 n = texelFetch(parts, ivec2(5, i), 0);
     vec4 offsets = texelFetch(parts, ivec2(6, i), 0);
-    vec2 sides = texelFetch(parts, ivec2(7, i), 0).xy;
+    vec4 sides = texelFetch(parts, ivec2(7, i), 0);
     int shape = int(target.w);
     vec3 aside = right.xyz * place.x + up.xyz * place.y;
     vec3 direction = normalize(eye.xyz - aside);
     vec4 at;
     if (!crossing(shape, vec2(right.w, up.w), focus, target.xyz + aside, direction, at)) continue;
+    // Within the beam of the part: its middle in the last two of the sides, its radius in the last of the offsets.
+    vec2 turned = (at.zw - sides.zw) / offsets.w;
+    if (offsets.w < 1.0 && dot(turned, turned) > 1.0) continue;
+    at.zw = clamp(diskToSquare(turned), 0.0, 1.0);
     bool wraps = shape == TUBE;
     vec2 ratio = quadrilinear(int(offsets.x), ivec4(n), at, wraps);
     vec2 space = bilinear(int(offsets.y), int(sides.x), at.xy, wraps);

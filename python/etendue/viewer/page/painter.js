@@ -228,8 +228,8 @@ export class Painter {
           ...local(view.toward.map((x) => x * view.distance)), part.level / this.reference,
           ...chart.focus,
           ...part.ratio.shape,
-          rows.ratio, rows.space, rows.direction, 0,
-          rows.spaceSide, rows.directionSide, 0, 0,
+          rows.ratio, rows.space, rows.direction, chart.beam[2],
+          rows.spaceSide, rows.directionSide, chart.beam[0], chart.beam[1],
         ],
         4 * COLUMNS * i,
       );
