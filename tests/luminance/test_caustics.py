@@ -194,3 +194,25 @@ def test_a_pixel_that_found_nothing_errs_as_its_neighbours() -> None:
     dark[:30] = False
     count = np.where(dark, 3, 0)
     assert (at_least_nearby(count * 1.0, count, dark)[:30] == 0).all()
+
+
+def test_a_dim_pixel_beside_a_bright_spot_errs_by_what_it_may_have_missed() -> None:
+    """Poisson counts of mean 0.7 beside such of mean 2000: a dim pixel's variance is 0.7. The stated one is k at least, and
+    k + 1 + 2 √(k + 1) of one contribution's square at most, whatever is beside it; neighbours alone say up to 1300.
+    """
+    rng, dim, bright = np.random.default_rng(8), 0.7, 2000.0
+    rate = np.full((60, 90), dim)
+    rate[:, 1::4] = bright
+    rate[17:19, :50] = bright
+    count = rng.poisson(rate)
+    weight = 3.0
+    held = at_least_nearby(count * weight**2, count, np.ones(count.shape, dtype=bool)) / weight**2
+    beside = rate == dim
+    k = count[beside]
+    assert len(k) > 3000
+    assert (held[beside] <= k + 1 + 2 * np.sqrt(k + 1)).all()
+    assert (held[beside] >= k).all()
+    off = np.abs(k - dim)
+    # Of pixels that are off by more than twice their error there are fewer than of normal deviates.
+    assert np.mean(off > 2 * np.sqrt(held[beside])) < 0.05
+    assert (held[~beside] == count[~beside]).all()

@@ -122,7 +122,8 @@ def at_least_nearby(variance: Array, count: npt.NDArray[np.integer[Any]], possib
 
     A pixel that no contribution has reached has a variance of 0 by its own account. With K contributions in the smallest
     square around it that holds a few, the mean of the variances there, times (K + 1)/K, is what it may be expected to have
-    [the mean of K + 1 under an even prior, K being Poisson distributed].
+    [the mean of K + 1 under an even prior, K being Poisson distributed]. But beside a bright spot it is known to get fewer:
+    with k of its own, no more than k + 1 + 2 √(k + 1) of the K, which is above the limit of 95 % of a Poisson distribution.
 
     Parameters
     ----------
@@ -152,6 +153,8 @@ def at_least_nearby(variance: Array, count: npt.NDArray[np.integer[Any]], possib
     sums = [np.pad(part.cumsum(0).cumsum(1), ((1, 0), (1, 0))) for part in fields]
     rows, columns = np.nonzero(needy)
     floor, open_ = np.zeros(len(rows)), np.ones(len(rows), dtype=bool)
+    own = count[needy] + 1.0
+    most = own + 2.0 * np.sqrt(own)
     radius = 1
     while open_.any():
         top, bottom = np.maximum(rows - radius, 0), np.minimum(rows + radius + 1, count.shape[0])
@@ -161,7 +164,7 @@ def at_least_nearby(variance: Array, count: npt.NDArray[np.integer[Any]], possib
         )
         whole = radius >= max(count.shape)
         done = open_ & ((found >= NEIGHBOURS) | whole)
-        floor[done] = (total / pixels * (found + 1.0) / np.maximum(found, 1.0))[done]
+        floor[done] = (total / np.maximum(found, 1.0) * np.minimum((found + 1.0) / pixels, most))[done]
         open_ &= ~done
         radius *= 2
     result = variance.copy()
