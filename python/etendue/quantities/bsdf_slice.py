@@ -256,36 +256,49 @@ def _integral(one: BsdfSlice) -> float:
 
     a, wa = points(azimuth)
     r, wr = points(radial)
-    # Nodes lie on lines of either coordinate: f is interpolated along one, then along the other.
+    # Nodes lie on lines of either coordinate. Along a line of one azimuth the integral is a sum over the radial nodes as far
+    # as the rim, of which f, linear between its own, takes fixed parts: the sums to each node are the same for all azimuths.
     j, k, v = _around(grid.azimuth, a % 360.0)
+    f = (1.0 - v)[:, None] * one.held[j] + v[:, None] * one.held[k]
     i, u = _between(grid.radial, r)
-    held = (1.0 - v)[:, None] * one.held[j] + v[:, None] * one.held[k]
-    f = held[:, i]
-    f *= 1.0 - u
-    f += u * held[:, np.minimum(i + 1, grid.radial.size - 1)]
-    f *= _projected(grid, r, a, one)
-    return float(np.radians(wa) @ f @ wr)
+    rim, parts = _projected(grid, r, a, one)
+    within = np.searchsorted(r, rim, side="right")
+    rows, last = np.arange(1, r.size + 1), np.minimum(i + 1, grid.radial.size - 1)
+    found = np.zeros(a.size)
+    for by_azimuth, by_radius in parts:
+        sums = np.zeros((r.size + 1, grid.radial.size))
+        sums[rows, i] = (1.0 - u) * by_radius * wr
+        sums[rows, last] += u * by_radius * wr
+        np.cumsum(sums, axis=0, out=sums)
+        found += by_azimuth * np.einsum("ij,ij->i", sums[within], f)
+    return float(np.radians(wa) @ found)
 
 
-def _projected(grid: PolarGrid, r: Array, a: Array, one: BsdfSlice) -> Array:
-    """Projected solid angle over the product of steps of both coordinates, azimuths in radians, shape (m, n).
+def _projected(grid: PolarGrid, r: Array, a: Array, one: BsdfSlice) -> tuple[Array, list[tuple[Array | float, Array]]]:
+    """Projected solid angle over the product of steps of both coordinates, azimuths in radians.
 
-    0 where there is no direction on the side where light leaves.
+    Returns
+    -------
+    array, shape (m,)
+        The radial coordinate at each azimuth up to which there are directions on the side where light leaves.
+    list of tuple
+        Products whose sum it is up to there: a factor of each azimuth, shape (m,), or of all, and one of each radial
+        coordinate, shape (n,).
     """
+    turn, t = np.radians(a), np.radians(r)
     if grid.frame == "cosines":
+        # |β₀ + r (cos a, sin a)|² = 1.
         sine = math.hypot(one.incident[0], one.incident[1])
-        # |β|² of β₀ and what is added to it.
-        squares = np.cos(np.radians(a))[:, None] * (2.0 * sine * r) + (sine * sine + r * r)
-        return np.where(squares <= 1.0, r, 0.0)
-    turn, t = np.radians(a)[:, None], np.radians(r)
+        inside = np.sqrt(np.maximum(1.0 - np.square(sine * np.sin(turn)), 0.0)) - sine * np.cos(turn)
+        return inside, [(1.0, r)]
+    step = math.radians(1.0) * np.sin(t)
     if grid.frame == "normal":
-        height = np.broadcast_to(np.cos(t), (a.size, r.size))
-    else:
-        # Along the specular direction and along the direction at right angles to it, towards the normal.
-        s, e, _ = specular_axes(one.incident, transmitted=one.transmitted)
-        side = math.copysign(1.0, s[2])
-        height = np.cos(turn) * (side * e[2] * np.sin(t)) + side * s[2] * np.cos(t)
-    return np.where(height >= 0.0, height, 0.0) * (np.sin(t) * math.radians(1.0))
+        return np.full(a.size, 90.0), [(1.0, step * np.cos(t))]
+    # Along the specular direction and along the direction at right angles to it, towards the normal.
+    s, e, _ = specular_axes(one.incident, transmitted=one.transmitted)
+    side = math.copysign(1.0, s[2])
+    across, along = side * e[2] * np.cos(turn), side * float(s[2])
+    return 90.0 + np.degrees(np.arctan2(across, along)), [(across, step * np.sin(t)), (along, step * np.cos(t))]
 
 
 def _extended(grid: PolarGrid, one: BsdfSlice) -> Array:
