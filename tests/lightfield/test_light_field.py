@@ -346,7 +346,7 @@ def test_a_beam_of_a_few_cells_of_direction_is_told_to_be_blurred(half_angle: fl
     narrow cone is not: it shows L (1 + cos a)/2, theory eq. 9."""
     rays = beam(half_angle, 6000)
     truth = 100.0 / (math.pi * 5.0 * math.sin(math.radians(half_angle))) ** 2 * 1e6
-    field = LightField.fit(rays, et.Disk(radius=5.0), depths=(2, 2, 3, 3))
+    field = LightField.fit(rays, et.Disk(radius=5.0, beam=(0, 0, 1)), depths=(2, 2, 3, 3))
     observer, screen = et.Observer(0, 0, 1e5), et.Screen(6, 6, 1, 1)
     lmap = et.luminance_map(field, observer, screen)
     off = abs(float(lmap.values[0, 0]) - truth) / float(lmap.standard_error[0, 0])
@@ -361,9 +361,9 @@ def test_a_beam_of_a_few_cells_of_direction_is_told_to_be_blurred(half_angle: fl
 def test_a_scene_tells_that_the_field_of_a_narrow_beam_is_blurred(
     half_angle: float, blurred: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # On the disk itself, for which a search takes seconds.
-    fit = LightField.fit
-    monkeypatch.setattr(LightField, "fit", staticmethod(lambda rays, _, **how: fit(rays, et.Disk(radius=5.0), **how)))
+    # On the disk itself, for which a search takes seconds, and without cells for the beam alone.
+    fit, disk = LightField.fit, et.Disk(radius=5.0, beam=(0, 0, 1))
+    monkeypatch.setattr(LightField, "fit", staticmethod(lambda rays, _, **how: fit(rays, disk, **how)))
     lamp = {"kind": "rays", "name": "lamp", "rays": beam(half_angle, 3000)}
     seen, notes = with_fields(et.Scene(sources=[lamp]), cache=False)
     told = [

@@ -30,11 +30,14 @@ WIDEST = 2.5
 PLANES = 24
 """Intervals of C around the axis that have two directions each, at least."""
 
+LEAST_LOST = 0.03
+"""Share of a peak below which what it lacks is not told."""
+
 MOST_PLANES, FINEST = 3600, 0.05
 """Planes, and step of γ [°], that may be asked for: each direction is an integral over the surface."""
 
-BROADENED = 30.0
-"""Cells of the field's directions that a beam must fill: one of so many has a peak that is some 3 % too low."""
+LOST = 0.9
+"""A beam that fills k cells of the field's directions was found to have a peak that is too low by some `LOST`/k of it."""
 
 
 def field_intensity(
@@ -133,7 +136,7 @@ def _broadened(field: EtendueDensity, found: Intensity) -> list[str]:
         return []
     beam = field.total_flux / found.maximum
     filled = beam / finest
-    if filled >= BROADENED:
+    if LOST / filled * found.maximum < max(found.peak_error, LEAST_LOST * found.maximum):
         return []
     told = f"the beam fills no more than {max(filled, 1.0):.2g} of the light field's {cells:,} cells of direction"
     return [f"{told}, which broaden it: the peak is too low by more than its error; take it from the rays themselves"]
