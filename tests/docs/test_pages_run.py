@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import shutil
 from pathlib import Path
 
@@ -35,8 +36,11 @@ def materials(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureR
 
 @pytest.fixture(scope="session")
 def kept_fields(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder for the light fields that pages fit."""
-    return tmp_path_factory.mktemp("kept")
+    """A folder for the light fields that pages fit, the same for all workers: a file is fitted once in a run."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "kept"
+    folder.mkdir(exist_ok=True)
+    return folder
 
 
 def test_the_tutorial_runs_on_its_public_file(samples: Path, materials: Path) -> None:

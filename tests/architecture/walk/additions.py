@@ -244,7 +244,8 @@ def peak(place: Path) -> Iterator[Case]:
 
 def copy_tree(root: Path) -> Path:
     """The parts of the tree that programs and tests need, in a new folder."""
-    unwanted = shutil.ignore_patterns("__pycache__", ".*_cache", "target", "*.pyc")
+    # What Python has compiled stays valid: copies keep the times of files.
+    unwanted = shutil.ignore_patterns(".*_cache", "target")
     for part in PARTS:
         shutil.copytree(ROOT / part, root / part, ignore=unwanted)
     for file in FILES:
