@@ -113,6 +113,7 @@ def test_a_narrow_beam_is_found_and_shown_as_sharply_as_the_rays_tell() -> None:
     assert np.mean(ratios) < most
 
 
+@pytest.mark.slow
 def test_light_without_a_beam_has_none() -> None:
     """Lambert's light, light in all directions, and what is stated to have none."""
     lambertian = et.RingSource(rays=20_000)

@@ -40,6 +40,9 @@ LARGEST = 0.5
 ROUNDS = 8
 """Times that the middle is sought among the nearer half of the light."""
 
+NOISE = 2.0
+"""Standard errors by which a field without a beam may lead the one with it by chance."""
+
 GRIDS, GRID = ((2, 6), (3, 5), (4, 4), (5, 3)), (4, 4)
 """Grids of which the best counts for the field without a beam, and that of fields with one: halvings of each coordinate of
 place and direction. Without a beam, fine cells of direction are wanted the more the narrower it is."""
@@ -68,7 +71,7 @@ def with_beam(
     Returns
     -------
     Plane or Disk
-        The beam stays None where the light is not narrow, or fields with a beam predict worse.
+        The beam stays None where the light is not narrow, or fields with a beam predict worse for sure.
 
     Raises
     ------
@@ -104,7 +107,7 @@ def with_beam(
     own = max((one.score for one in without), key=lambda score: score.mean)
     best = max(range(len(within)), key=lambda k: within[k].score.mean)
     lead, error = within[best].score.lead(own)
-    return beamed[best] if lead > -error else surface
+    return beamed[best] if lead > -NOISE * error else surface
 
 
 def _beams(cosines: FloatArray, flux: FloatArray, *, is_centred: bool) -> list[Beam]:
