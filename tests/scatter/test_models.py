@@ -83,6 +83,19 @@ def test_reflectance_of_metals_is_the_closed_form() -> None:
     assert float(glass.reflectance(math.degrees(math.atan(1.5)))) == pytest.approx(0.5 * (1.25 / 3.25) ** 2, abs=2e-3)
 
 
+@pytest.mark.parametrize("outside", [1.0, 1.33, 1.5186])
+def test_a_metal_reflects_by_the_medium_in_front(outside: float) -> None:
+    """Fresnel's equations of (n + ik)/n₁ from 0 to 70°, from either side; but for the mean slope of the facets."""
+    metal = et.bsdf.RoughMetal(roughness=0.001, index=1.2, extinction=2.0)
+    theta = np.array([0.0, 25.0, 50.0, 70.0])
+    c, m = np.cos(np.radians(theta)), (1.2 + 2j) / outside
+    across = np.sqrt(m * m - 1 + c * c)
+    s, p = (c - across) / (c + across), (m * m * c - across) / (m * m * c + across)
+    expected = (np.abs(s) ** 2 + np.abs(p) ** 2) / 2
+    assert metal.reflectance(theta, media=(outside, 1.0)) == pytest.approx(expected, abs=1e-3)
+    assert metal.reflectance(theta, side="back", media=(1.0, outside)) == pytest.approx(expected, abs=1e-3)
+
+
 def test_brushed_metal_is_wide_across_its_axis() -> None:
     metal = et.bsdf.RoughMetal(roughness=0.05, roughness_across=0.4, reflectance=1.0)
     normal, tilt = [0.0, 0.0, 1.0], math.sin(math.radians(20.0))

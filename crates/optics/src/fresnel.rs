@@ -1,4 +1,4 @@
-//! Reflection and refraction at a smooth interface of two transparent media.
+//! Reflection and refraction at a smooth interface of two transparent media, and at a metal.
 
 use etendue_math::Vec3;
 
@@ -29,6 +29,26 @@ pub fn fresnel(cosine: f64, n1: f64, n2: f64) -> Fresnel {
     }
 }
 
+/// Fresnel's reflectance of a metal for unpolarised light that arrives at an angle with this `cosine`, its n and k being those
+/// against the medium in which the light arrives. `[BornWolf1999]`, section 14.2.
+#[must_use]
+pub fn fresnel_of_metal(cosine: f64, n: f64, k: f64) -> f64 {
+    if cosine <= 0.0 {
+        return 1.0;
+    }
+    let square = 1.0 - cosine * cosine;
+    // a + ib = √((n + ik)² − sin²θ)
+    let (real, size) = (n * n - k * k - square, (n * n - k * k - square).hypot(2.0 * n * k));
+    let a = (0.5 * (size + real)).max(0.0).sqrt();
+    let across = |c: f64| {
+        let (sum, mixed) = (size + c * c, 2.0 * a * c);
+        (sum - mixed) / (sum + mixed)
+    };
+    let s = across(cosine);
+    let p = s * across(square / cosine);
+    0.5 * (s + p)
+}
+
 /// The direction after reflection. `normal` faces the light: d·n = −`cosine`.
 #[inline(always)]
 #[must_use]
@@ -53,6 +73,27 @@ fn renormalized(d: Vec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_metal_by_the_complex_amplitudes() {
+        // r_s = (cos − w)/(cos + w), r_p = (m² cos − w)/(m² cos + w), w² = m² − sin², m = n + ik, with complex numbers by hand.
+        let divided = |[a, b]: [f64; 2], [c, d]: [f64; 2]| (a * a + b * b) / (c * c + d * d);
+        for (n, k) in [(0.96, 6.69), (1.2, 2.0), (0.05, 3.0), (1.5, 0.0), (3.0, 1e-9)] {
+            for cosine in [1.0_f64, 0.7, 0.2, 1e-3] {
+                let m2 = [n * n - k * k, 2.0 * n * k];
+                let under = [m2[0] - 1.0 + cosine * cosine, m2[1]];
+                let (size, half) = (under[0].hypot(under[1]).sqrt(), 0.5 * under[1].atan2(under[0]));
+                let w = [size * half.cos(), size * half.sin()];
+                let s = divided([cosine - w[0], -w[1]], [cosine + w[0], w[1]]);
+                let c = m2.map(|x| x * cosine);
+                let p = divided([c[0] - w[0], c[1] - w[1]], [c[0] + w[0], c[1] + w[1]]);
+                let found = fresnel_of_metal(cosine, n, k);
+                assert!((found - 0.5 * (s + p)).abs() < 1e-12, "{n} {k} {cosine}: {found}");
+            }
+        }
+        assert!((fresnel_of_metal(0.6, 1.5, 0.0) - fresnel(0.6, 1.0, 1.5).reflectance).abs() < 1e-14);
+        assert!((fresnel_of_metal(0.0, 1.2, 2.0) - 1.0).abs() < 1e-15);
+    }
 
     #[test]
     fn known_values_and_symmetry() {

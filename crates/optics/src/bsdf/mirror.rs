@@ -64,6 +64,10 @@ impl Bsdf for Mirror {
         }
     }
 
+    fn is_nothing(&self, media: &Media) -> bool {
+        media.front == media.back && self.facts.constant == Some([0.0, 1.0, 0.0, 0.0])
+    }
+
     fn breakpoints(&self) -> Option<[Vec<f64>; 2]> {
         Some(Table::breakpoints(&self.tables))
     }

@@ -24,6 +24,7 @@ mod mixture;
 mod monotone_cubic;
 mod profile;
 mod rough_coat;
+mod rough_conductor;
 mod rough_interface;
 mod rough_metal;
 mod shares;
@@ -42,6 +43,7 @@ pub use mirror::Mirror;
 pub use mixture::Mixture;
 pub use profile::Profile;
 pub use rough_coat::RoughCoat;
+pub use rough_conductor::RoughConductor;
 pub use rough_interface::RoughInterface;
 pub use rough_metal::RoughMetal;
 pub use shares::{Component, Shares};
@@ -58,7 +60,7 @@ pub fn described(kind: &str, by: &dyn Parameters) -> Option<Result<Arc<dyn Bsdf>
         "cosine-power" => Some(CosinePower::described(by)),
         "coated" => Some(Coated::described(by)),
         "rough-coat" => Some(RoughCoat::described(by)),
-        "rough-metal" => Some(RoughMetal::described(by)),
+        "rough-metal" => Some(RoughConductor::described(by)),
         "rough-interface" => Some(RoughInterface::described(by)),
         "abg" | "harvey-shack" | "gaussian" => Some(Lobe::described(kind, by)),
         _ => None,
@@ -80,6 +82,7 @@ fn kinds() -> &'static [Vec<examples::Example>] {
             Mirror::named("mirror"),
             Mixture::named("mixture"),
             RoughCoat::named("rough_coat"),
+            RoughConductor::named("rough_conductor"),
             RoughInterface::named("rough_interface"),
             RoughMetal::named("rough_metal"),
             Tabulated::named("tabulated"),

@@ -5,13 +5,11 @@ from __future__ import annotations
 import abc
 from typing import Annotated, Literal
 
-import numpy as np
-import numpy.typing as npt
 from annotated_types import Ge, Gt, Le
 from pydantic import Field
 
 from etendue.description.files import Files
-from etendue.description.tables import Grid, Shares, grid_of
+from etendue.description.tables import Shares, grid_of
 from etendue.description.values import AsNumber, Finite
 from etendue.errors import ArgumentError
 from etendue.scatter.models.finish import Directed, Record
@@ -64,7 +62,8 @@ class RoughMetal(Rough):
     reflectance : number or ShareTable
         Of the smooth metal, by angle of incidence and wavelength.
     index, extinction : number, optional
-        In place of `reflectance`: the refractive index n and the extinction coefficient k of the metal against air.
+        In place of `reflectance`: the refractive index n and the extinction coefficient k of the metal. What it reflects
+        depends, by Fresnel's equations, on the medium in which light arrives.
 
     Examples
     --------
@@ -79,33 +78,14 @@ class RoughMetal(Rough):
     extinction: Annotated[float, Finite, Ge(0.0), Le(100.0), AsNumber] | None = None
 
     def parameters(self, files: Files) -> Record:
-        """The reflectance, by Fresnel's equations where the index is stated."""
+        """The reflectance, or the index of the metal."""
         if self.stated_reflectance is not None:
             if self.index is not None or self.extinction is not None:
                 raise ArgumentError("RoughMetal takes reflectance, or index and extinction; not both")
             return {"reflectance": grid_of(self.stated_reflectance, files).record()}
         if self.index is None or self.extinction is None:
             raise ArgumentError("RoughMetal needs reflectance, or index and extinction")
-        # Linear in between; so near that it matters nowhere.
-        angle = np.concatenate([np.arange(0.0, 80.0, 0.5), np.arange(80.0, 90.01, 0.1)])
-        values = reflectance_of_metal(angle, index=self.index, extinction=self.extinction)
-        return {"reflectance": Grid(angle, np.array([555.0]), values[:, None]).record()}
-
-
-def reflectance_of_metal(angle: npt.NDArray[np.float64], *, index: float, extinction: float) -> npt.NDArray[np.float64]:
-    """Of unpolarised light from air on a smooth surface of n + ik, at angles [°]: [BornWolf1999]_, section 14.2.
-
-    Examples
-    --------
-    >>> reflectance_of_metal(np.array([0.0, 90.0]), index=0.96, extinction=6.69).round(4).tolist()
-    [0.921, 1.0]
-    """
-    cosine = np.cos(np.radians(np.minimum(angle, 90.0)))
-    n = complex(index, extinction)
-    across = np.sqrt(n * n - (1.0 - cosine * cosine))
-    s = np.abs((cosine - across) / (cosine + across)) ** 2
-    p = np.abs((n * n * cosine - across) / (n * n * cosine + across)) ** 2
-    return np.asarray(0.5 * (s + p))
+        return {"index": self.index, "extinction": self.extinction}
 
 
 class RoughInterface(Rough):
