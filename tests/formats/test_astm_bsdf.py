@@ -51,7 +51,6 @@ def test_a_grid_and_the_other_side_of_the_normal(tmp_path: Path) -> None:
     assert float(one.at(direction(60.0, 0.0))) == pytest.approx(0.16)
 
 
-@pytest.mark.slow
 def test_scattered_points_stand_for_what_is_near(tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
     angles = np.column_stack([np.degrees(np.arcsin(np.sqrt(rng.uniform(0, 0.999, 400)))), rng.uniform(0, 360, 400)])

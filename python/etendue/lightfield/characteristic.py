@@ -15,8 +15,8 @@ from etendue.quantities.ray_stream import checked_threads
 from etendue.units import MM2_PER_M2
 
 POINTS = 1 << 18
-"""Lines at which a field is read. Of five sources their sum is the flux to 5e-4, and the étendue of half of it that of 2²² lines
-to 7e-4; the brightest luminances differ by less than a fiftieth of their standard errors."""
+"""Lines at which a field is read. Of five sources their sum is the flux to 5e-4, and the étendue of half of it that of 2²²
+lines to 7e-4; the brightest luminances differ by less than a fiftieth of their standard errors."""
 
 BATCH = 1 << 18
 """Lines that are read at a time."""
