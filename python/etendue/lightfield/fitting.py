@@ -416,7 +416,7 @@ def fit_counts(
         flux_unit=rays.flux_unit,
         report=report,
         provenance=rays.provenance.then(f"light field on {counts.surface.spec}"),
-        notes=(*_notes(counts), *told_of_narrow_beams(parts, counts.part_flux)),
+        notes=(*_notes(counts), *told_of_narrow_beams(counts.surface.parts(), parts, counts.part_flux)),
     )
 
 

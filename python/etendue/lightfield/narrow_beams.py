@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from etendue.lightfield.carrier.part import ALL, Part
 from etendue.lightfield.etendue_density import PartField
 from etendue.lightfield.trees import Base
 
@@ -44,14 +45,18 @@ def filled_cells(part: PartField) -> tuple[float, int]:
     return (float(light.sum()) ** 2 / squares if squares > 0.0 else 0.0), light.size
 
 
-def told_of_narrow_beams(parts: Sequence[PartField], fluxes: Sequence[float]) -> Iterator[str]:
+def told_of_narrow_beams(
+    charts: Sequence[Part], parts: Sequence[PartField], fluxes: Sequence[float]
+) -> Iterator[str]:
     """What is to be said of the part with the most light, if its cells of direction blur it.
 
     Examples
     --------
     >>> beam = np.zeros((1, 1, 64, 64), dtype=np.float32)
     >>> beam[0, 0, 30:34, 30:33] = 2.0
-    >>> list(told_of_narrow_beams([PartField(beam, beam, None, None, 1.0)], [100.0]))  # doctest: +ELLIPSIS
+    >>> from etendue.lightfield.carrier.part import WORLD
+    >>> whole = Part("disk", "disk", (0, 0, 0), WORLD, (1.0, 0.0))
+    >>> list(told_of_narrow_beams([whole], [PartField(beam, beam, None, None, 1.0)], [100.0]))  # doctest: +ELLIPSIS
     ["the light fills no more than 12 of the light field's 4,096 cells of direction, which blur it: ..."]
     """
     brightest = int(np.argmax(fluxes))
@@ -59,8 +64,9 @@ def told_of_narrow_beams(parts: Sequence[PartField], fluxes: Sequence[float]) ->
     if not 0.0 < filled < min(ENOUGH, NARROW * cells):
         return
     off = "much more" if filled < LEAST_TOLD else f"some {100.0 * BLURRED / filled**0.5:.1g} % more"
+    stated = "" if charts[brightest].beam != ALL else "; a plane or a disk with a beam has cells for it alone"
     yield (
         f"the light fills no more than {filled:,.0f} of the light field's {cells:,} cells of direction, which blur it: "
         f"luminances in the beam are off by {off} than their errors; a cone much narrower than the beam shows them from the "
-        "rays themselves"
+        f"rays themselves{stated}"
     )
