@@ -45,9 +45,7 @@ def filled_cells(part: PartField) -> tuple[float, int]:
     return (float(light.sum()) ** 2 / squares if squares > 0.0 else 0.0), light.size
 
 
-def told_of_narrow_beams(
-    charts: Sequence[Part], parts: Sequence[PartField], fluxes: Sequence[float]
-) -> Iterator[str]:
+def told_of_narrow_beams(charts: Sequence[Part], parts: Sequence[PartField], fluxes: Sequence[float]) -> Iterator[str]:
     """What is to be said of the part with the most light, if its cells of direction blur it.
 
     Examples
