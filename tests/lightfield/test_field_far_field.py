@@ -102,3 +102,17 @@ def test_rays_of_unequal_flux_count_less(tmp_path: Path) -> None:
     even = et.LightField.fit(rays, et.Disk(radius=5.01), depths=(2, 2, 4, 4))
     share = [f.intensity(4, 15).standard_error[0, 0] / f.intensity(4, 15).values[0, 0] for f in (kept, even)]
     assert share[0] / share[1] == pytest.approx(np.sqrt(20_000 / kish), rel=0.1)
+
+
+def test_steps_that_a_narrow_beam_needs_can_be_had(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The step that the notes ask for is one that a field takes, whatever the beam; tables without end are refused."""
+    # One point of the surface stands for all: the light is the same everywhere.
+    monkeypatch.setattr("etendue.lightfield.far_field.SIDE", 1)
+    field = field_of(3000, 2e5, 0.0, 0.0, 3, 2)
+    told = next(note for note in field.intensity(24, 1.0).notes if "cannot hold it" in note)
+    step = float(told.partition("γ in steps of ")[2].partition("°")[0])
+    assert step < 0.05
+    finer = field.intensity(4, 180.0 / round(180.0 / step))
+    assert not any("cannot hold it" in note for note in finer.notes)
+    with pytest.raises(et.ArgumentError, match=r"18,000,000 nodes; of a light field 13,000,000 can be had"):
+        field.intensity(4000, 0.04)

@@ -33,8 +33,8 @@ PLANES = 24
 LEAST_LOST = 0.03
 """Share of a peak below which what it lacks is not told."""
 
-MOST_PLANES, FINEST = 3600, 0.05
-"""Planes, and step of γ [°], that may be asked for: each direction is an integral over the surface."""
+MOST = 13_000_000
+"""Nodes that may be asked for, those of `PLANES` planes at least: each direction is an integral over the surface."""
 
 LOST = 0.9
 """A beam that fills k cells of the field's directions was found to have a peak that is too low by some `LOST`/k of it."""
@@ -53,10 +53,11 @@ def field_intensity(
     (4, 7)
     """
     check_steps(c_planes, gamma_step)
-    if (c_planes or 1) > MOST_PLANES or (gamma_step or 90.0) < FINEST:
+    asked = max(c_planes or 1, PLANES) * round(180.0 / (gamma_step or 90.0))
+    if asked > MOST:
         raise ArgumentError(
-            f"c_planes is {c_planes} and gamma_step {gamma_step}°; of a light field, up to {MOST_PLANES:,} planes and "
-            f"steps of {FINEST}° or more can be had."
+            f"c_planes is {c_planes} and gamma_step {gamma_step}°, {asked:,} nodes; of a light field {MOST:,} can be had: give "
+            "fewer c_planes or a larger gamma_step."
         )
     rests = field.report.effective_rays
     known = math.isfinite(rests) and rests > 0.0
