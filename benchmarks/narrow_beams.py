@@ -1,8 +1,8 @@
 """Luminance within narrow beams, by light fields with cells of direction for the beam alone and without.
 
-A rectangle of 8 mm × 5 mm shines into a beam that leans by 6°, evenly into a disk of direction cosines or by a Gauss function.
-Its luminance is known. Lines from even places and directions in the beam are read in fields of several seeds: how far off
-they are (root mean square), what is stated, and the mean square of the deviations over the stated errors, which should be 1.
+A rectangle of 8 mm × 5 mm shines into a beam that leans by 6°, evenly into a disk of direction cosines or by a Gauss
+function. Its luminance is known. Lines from even places and directions in the beam are read in fields of several seeds: how
+far off they are (root mean square), what is stated, and the mean square of deviations over stated errors, which should be 1.
 
 python benchmarks/narrow_beams.py [--rays 1e4 1e5] [--half-angles 2 4 8] [--seeds 3]
 """

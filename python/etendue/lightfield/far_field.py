@@ -56,8 +56,8 @@ def field_intensity(
     asked = max(c_planes or 1, PLANES) * round(180.0 / (gamma_step or 90.0))
     if asked > MOST:
         raise ArgumentError(
-            f"c_planes is {c_planes} and gamma_step {gamma_step}°, {asked:,} nodes; of a light field {MOST:,} can be had: give "
-            "fewer c_planes or a larger gamma_step."
+            f"c_planes is {c_planes} and gamma_step {gamma_step}°, {asked:,} nodes; of a light field {MOST:,} can be had: "
+            "give fewer c_planes or a larger gamma_step."
         )
     rests = field.report.effective_rays
     known = math.isfinite(rests) and rests > 0.0
