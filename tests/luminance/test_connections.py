@@ -75,22 +75,3 @@ def test_a_weak_lamp_close_by_among_many(lines: int, seeds: int) -> None:
     """Of more than eight lamps one is connected to: that which brings most of the light must not be missed for its flux."""
     strong = [((200.0 * i - 700, 300.0, 900.0), 40.0, 1000.0) for i in range(9)]
     errors_hold(lamps=[((58.0, 34.0, 60.0), 5.0, 10.0), *strong], theta=0, lines=lines, seeds=seeds)
-
-
-def test_a_sheet_that_does_nothing_changes_nothing() -> None:
-    """A transparent sheet between lamp and floor, and before the eye: the same map, seen from above and from below it."""
-    floor = {"shape": {"kind": "rectangle", "width": 60, "height": 40},
-             "finish": {"kind": "lambertian", "reflectance": 0.3}}  # fmt: skip
-    lamp = {"kind": "surface", "shape": {"kind": "rectangle", "width": 4, "height": 2}, "flux": 100, "at": [3, 2, 20],
-            "toward": [0, 0, -1]}  # fmt: skip
-    sheet = {"shape": {"kind": "rectangle", "width": 60, "height": 60}, "at": [0, 0, 12], "finish": "transparent"}
-    for observer in (et.Observer(60, 30, 200), et.Observer(85, 30, 100, target=(0, 0, 2))):
-        plain, behind = (
-            et.luminance_map(
-                et.Scene(sources=[lamp], surfaces=surfaces), observer, et.Screen(4, 4, 3, 3), rays_per_pixel=64
-            )
-            for surfaces in ([floor], [floor, sheet])
-        )
-        assert (plain.values > 0.0).sum() >= 8
-        np.testing.assert_allclose(behind.values, plain.values, rtol=1e-12)
-        np.testing.assert_allclose(behind.standard_error, plain.standard_error, rtol=1e-9)

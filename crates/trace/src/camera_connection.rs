@@ -76,7 +76,7 @@ fn sight(event: &ScatterEvent, scene: &Scene, view: &View, media: &mut MediumCac
 /// The share of its light that gets to the observer.
 fn passes(event: &ScatterEvent, scene: &Scene, view: &View, sight: &Sight, media: &mut MediumCache) -> f64 {
     let stack = sight.stack;
-    transmittance(
+    transmittance::<false>(
         scene,
         [event.point, view.observer],
         event.origin_faces,

@@ -273,6 +273,20 @@ impl<'a> SurfaceEvent<'a> {
         self.surface.bsdf.seen(self.towards, &self.surface.media)
     }
 
+    /// The share of the radiance along the line that goes straight on, as through a filter; 0 where that way bends.
+    #[inline]
+    #[must_use]
+    pub fn straight_on(&self) -> f64 {
+        if self.is_straight() { self.seen().0[1] } else { 0.0 }
+    }
+
+    /// Whether what is transmitted without being scattered keeps its direction.
+    #[inline]
+    #[must_use]
+    pub fn is_straight(&self) -> bool {
+        self.surface.media.front == self.surface.media.back
+    }
+
     /// The direction after it is mirrored, and the solids there.
     #[inline]
     #[must_use]

@@ -14,11 +14,11 @@ use crate::solid_stack::SolidStack;
 const MOST_PASSED: u32 = 1000;
 
 /// The share of light that gets from a point to another without being scattered, reflected or refracted: what media do not
-/// absorb, 0 if there is a surface in between.
+/// absorb, times what goes straight through sheets if `FILTERED`; 0 if there is any other surface in between.
 ///
 /// `told` is called with each stretch: the solids that it lies in, and what ends it before its end, if anything does.
 #[must_use]
-pub fn transmittance(
+pub fn transmittance<const FILTERED: bool>(
     scene: &Scene,
     [from, to]: [Vec3; 2],
     origin_faces: OriginFaces,
@@ -27,7 +27,8 @@ pub fn transmittance(
     wavelength: f64,
     mut told: impl FnMut(SolidStack, Option<&Interaction>),
 ) -> f64 {
-    let (mut o, mut origin_faces, mut stack, mut depth) = (from, origin_faces, stack, 0.0);
+    let (mut o, mut origin_faces, mut stack) = (from, origin_faces, stack);
+    let (mut depth, mut through) = (0.0, 1.0);
     let d = (to - from).normalized();
     for _ in 0..MOST_PASSED {
         let distance = (to - o).dot(d);
@@ -40,10 +41,19 @@ pub fn transmittance(
             Err(_) => return 0.0,
             Ok(None) => {
                 depth += absorption * distance;
-                return if depth == 0.0 { 1.0 } else { (-depth).exp() };
+                return if depth == 0.0 {
+                    through
+                } else {
+                    through * (-depth).exp()
+                };
             }
             Ok(Some(interaction)) => {
-                if !matches!(SurfaceEvent::new(scene, &interaction, d, wavelength, media), Ok(None)) {
+                match SurfaceEvent::new(scene, &interaction, d, wavelength, media) {
+                    Ok(None) => {}
+                    Ok(Some(event)) if FILTERED && event.bsdf().facts().specular[1] => through *= event.straight_on(),
+                    _ => return 0.0,
+                }
+                if through == 0.0 {
                     return 0.0;
                 }
                 depth += absorption * interaction.t;

@@ -13,7 +13,7 @@ pub enum Portion {
     /// All of it.
     Whole,
     /// What the reverse tracer cannot find, or leaves to the light image: of sources that cannot be seen backwards, and of all
-    /// sources through smooth surfaces onto the first diffuse one.
+    /// sources through smooth surfaces that mirror or bend light onto the first diffuse one.
     Unseen,
     /// Of that light, the share that lines of sight do not have.
     Shared(MisBalance),

@@ -95,7 +95,10 @@ impl BlockTrace<'_> {
             return Err(Fate::OnFace(interaction.face));
         };
         if component.is_specular() {
-            state.go_smoothly(interaction.face, component.is_transmitted());
+            // What goes straight on is found backwards, by connections.
+            if !(component.is_transmitted() && met.is_straight()) {
+                state.go_smoothly(interaction.face, component.is_transmitted());
+            }
         } else {
             state.scattered = true;
         }

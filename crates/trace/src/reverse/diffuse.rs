@@ -238,7 +238,7 @@ impl PathBlock<'_> {
                 }
             } else {
                 let origin_faces = self.shadows.origin_faces(i);
-                transmittance(
+                transmittance::<true>(
                     scene,
                     [o, connection.to],
                     origin_faces,

@@ -163,10 +163,11 @@ impl PathBlock<'_> {
         let facts = event.bsdf().facts();
         let is_specular = facts.specular != [false; 2];
         let (smooth, shares) = if is_specular { event.seen() } else { Default::default() };
-        let seen = if branch.seen == Seen::Smooth {
-            Seen::Smooth
-        } else {
-            Seen::Caustic
+        // Connections to sources go straight through sheets, too: of such ways both know the density.
+        let seen = |transmitted: bool| match branch.seen {
+            Seen::Smooth => Seen::Smooth,
+            Seen::Diffuse { .. } if transmitted && event.is_straight() => branch.seen,
+            _ => Seen::Caustic,
         };
         // One of the ways on, which all are followed; or the one that was drawn.
         let go = |block: &mut Self, transmitted: bool, weight: f64, share: Option<f64>| {
@@ -178,7 +179,7 @@ impl PathBlock<'_> {
             let branch = Branch {
                 stack,
                 weight,
-                seen,
+                seen: seen(transmitted),
                 drawn: branch.drawn || share.is_none(),
                 ways: led_on(branch.ways, transmitted),
                 direct: branch.direct && branch.scatters > 0,
