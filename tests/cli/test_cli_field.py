@@ -438,7 +438,7 @@ def test_intensity_of_a_field(run: Run, folder: Path, tmp_path: Path) -> None:
         ),
         (["luminance", "{}/short.h5", *VIEW, "-o", "a.npz"], 1, "short.h5"),
         (["intensity", "{}/dome.h5", "--flux", "3"], 2, "--flux: for ray files"),
-        (["intensity", "{}/dome.h5", "--c-planes", "9999"], 1, "9999"),
+        (["intensity", "{}/dome.h5", "--c-planes", "9999", "--gamma-step", "0.1"], 1, "9999"),
         (["intensity", "{}/short.h5"], 1, "short.h5"),
     ],
 )

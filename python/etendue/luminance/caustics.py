@@ -143,7 +143,7 @@ def at_least_nearby(variance: Array, count: npt.NDArray[np.integer[Any]], possib
     >>> import numpy as np
     >>> count = np.array([[3, 0, 2], [12, 1, 4]])
     >>> at_least_nearby(count / 1.0, count, np.ones((2, 3), dtype=bool)).round(2)
-    array([[ 4.25,  3.83,  2.  ],
+    array([[ 4.25,  3.  ,  2.  ],
            [12.  ,  3.83,  4.  ]])
     """
     needy = possible & (count < FEW)
