@@ -13,12 +13,13 @@ from typing import TypeVar
 import numpy as np
 
 from etendue.lightfield.carrier import Disk, Plane
-from etendue.lightfield.carrier.part import ALL, Beam
+from etendue.lightfield.carrier.part import Beam
 from etendue.lightfield.carrier.towards import upright
 from etendue.lightfield.counting import FloatArray
 from etendue.lightfield.pilot_sample import even_density, pilot_sample
 from etendue.lightfield.selection.scorer import WITH_IMAGES, SurfaceScorer
 from etendue.quantities.ray_stream import RayStream
+from etendue.quantities.weighted_quantile import weighted_quantile
 
 Flat = TypeVar("Flat", bound=Plane | Disk)
 
@@ -114,9 +115,7 @@ def _beams(cosines: FloatArray, flux: FloatArray, *, is_centred: bool) -> list[B
     """The disks to be tried, from small to large."""
     middle = np.zeros(2) if is_centred else _middle(cosines, flux)
     distance = np.hypot(*(cosines - middle).T)
-    order = np.argsort(distance, kind="stable")
-    upto = np.cumsum(flux[order])
-    core = float(distance[order[np.searchsorted(upto, CORE * upto[-1])]])
+    core = weighted_quantile(distance, flux, CORE)
     beams = []
     for factor in RADII:
         radius = factor * core
@@ -124,7 +123,7 @@ def _beams(cosines: FloatArray, flux: FloatArray, *, is_centred: bool) -> list[B
             break
         unit = 10.0 ** (math.floor(math.log10(radius)) - 2)
         u, v, radius = (round(x / unit) * unit for x in (*middle.tolist(), radius))
-        if math.hypot(u, v) + radius <= 1.0 and (u, v, radius) != ALL:
+        if math.hypot(u, v) + radius <= 1.0:
             beams.append((float(f"{u:.12g}"), float(f"{v:.12g}"), float(f"{radius:.12g}")))
     return beams
 
@@ -132,16 +131,10 @@ def _beams(cosines: FloatArray, flux: FloatArray, *, is_centred: bool) -> list[B
 def _middle(cosines: FloatArray, flux: FloatArray) -> FloatArray:
     """Where the light is densest: the median, again and again of the half of the light that is nearest to it."""
     for _ in range(ROUNDS):
-        middle = np.array([_median(x, flux) for x in cosines.T])
+        middle = np.array([weighted_quantile(x, flux, 0.5) for x in cosines.T])
         distance = np.hypot(*(cosines - middle).T)
-        near = distance <= _median(distance, flux)
+        near = distance <= weighted_quantile(distance, flux, 0.5)
         if np.count_nonzero(near) < FEWEST:
             break
         cosines, flux = cosines[near], flux[near]
     return middle
-
-
-def _median(values: FloatArray, flux: FloatArray) -> float:
-    order = np.argsort(values, kind="stable")
-    upto = np.cumsum(flux[order])
-    return float(values[order[np.searchsorted(upto, 0.5 * upto[-1])]])

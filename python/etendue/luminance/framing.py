@@ -17,6 +17,7 @@ from etendue.quantities.provenance import Provenance
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
 from etendue.quantities.vectors import lengths
+from etendue.quantities.weighted_quantile import weighted_quantile
 from etendue.scene import Scene, compile_scene
 from etendue.scene.compiling import Compiled
 from etendue.scene.framing import corners_of, framed_screen
@@ -180,7 +181,7 @@ def framed(rays: RaySet | Lines, observer: Observer, columns: int = 128, rows: i
             f"no ray of {lines.source} heads for the observer at θ {observer.theta:g}°, φ {observer.phi:g}°: "
             "from there the source is dark. Choose another observer, or state the screen's size."
         )
-    reach = [_quantile(np.abs(axis), light.flux) for axis in (light.right, light.up)]
+    reach = [weighted_quantile(np.abs(axis), light.flux, SHOWN) for axis in (light.right, light.up)]
     side = max(2.0 * MARGIN * max(reach[0] / columns, reach[1] / rows), np.finfo(np.float64).tiny)
     pixel = _rounded_up(side * columns) / columns
     return Screen(pixel * columns, pixel * rows, columns, rows)
@@ -273,7 +274,7 @@ def centre_of_light(rays: RaySet | Lines) -> tuple[float, float, float]:
     lines = Lines.of(rays)
     point = lines.focus
     off = lengths(np.cross(lines.position - point, lines.direction))
-    step = 10.0 ** np.floor(np.log10(max(_quantile(off, lines.flux), 1e-6))) / 10.0
+    step = 10.0 ** np.floor(np.log10(max(weighted_quantile(off, lines.flux, SHOWN), 1e-6))) / 10.0
     x, y, z = np.round(point / step) * step + 0.0
     return (float(f"{x:.12g}"), float(f"{y:.12g}"), float(f"{z:.12g}"))
 
@@ -330,7 +331,7 @@ def missed_notes(rays: RaySet | Lines, observer: Observer, screen: Screen) -> tu
         return ()
     middle = centre_of_light(lines)
     from_middle = lengths(lines.position - np.asarray(middle))
-    if np.linalg.norm(observer.position - np.asarray(middle)) < _quantile(from_middle, lines.flux):
+    if np.linalg.norm(observer.position - np.asarray(middle)) < weighted_quantile(from_middle, lines.flux, SHOWN):
         return ()
     there = dataclasses.replace(observer, target=middle)
     if not (light.flux.any() and light_towards(lines, there, screen).flux.any()):
@@ -340,17 +341,6 @@ def missed_notes(rays: RaySet | Lines, observer: Observer, screen: Screen) -> tu
     shown = f"{light.share(screen):.1%} of the light that heads for the observer (rays within {light.cone:g}°)"
     size = f"{whole.width:g} × {whole.height:g} mm"
     return (f"the screen shows {shown}; one of {size} about the target {place} shows it",)
-
-
-def _quantile(values: Array, weights: Array) -> float:
-    """The value that the share `SHOWN` of the weights does not exceed."""
-    if (weights == weights[0]).all():  # which need not be put into the order of the values, and that takes longest
-        summed = np.cumsum(weights)
-        rank = min(int(np.searchsorted(summed, SHOWN * summed[-1])), len(values) - 1)
-        return float(np.partition(values, rank)[rank])
-    order = np.argsort(values)
-    summed = np.cumsum(weights[order])
-    return float(values[order][min(np.searchsorted(summed, SHOWN * summed[-1]), len(order) - 1)])
 
 
 def _rounded_up(value: float) -> float:

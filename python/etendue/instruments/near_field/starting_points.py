@@ -9,6 +9,7 @@ from etendue.lightfield.carrier import Disk, Part, Plane, Surface
 from etendue.lightfield.selection.settings import DEFAULT
 from etendue.lightfield.selection.trial_surfaces import TrialSurfaces
 from etendue.quantities.ray_set import RaySet
+from etendue.quantities.weighted_quantile import weighted_quantile
 
 Array = npt.NDArray[np.float64]
 
@@ -125,14 +126,14 @@ def _flats(rays: RaySet, centre: Array, reach: float) -> list[Surface]:
         """Half width and half height of the rectangle, and radius of the disk."""
         at = (x + ((z - x[:, 2]) / k[:, 2])[:, None] * k)[:, :2] - centre[:2]
         # Half of what may be left out on each pair of sides, all of it around.
-        width, height = (_quantile(np.abs(side), flux, 1.0 - LEFT_OUT / 4) for side in at.T)
-        return width, height, _quantile(np.hypot(*at.T), flux, 1.0 - LEFT_OUT / 2)
+        width, height = (weighted_quantile(np.abs(side), flux, 1.0 - LEFT_OUT / 4) for side in at.T)
+        return width, height, weighted_quantile(np.hypot(*at.T), flux, 1.0 - LEFT_OUT / 2)
 
     def spread(z: float) -> float:
         """How far half of the light crosses from the middle of all of it: small where the brightest part is."""
         at = (x + ((z - x[:, 2]) / k[:, 2])[:, None] * k)[:, :2]
-        middle = [_quantile(side, flux, 0.5) for side in at.T]
-        return _quantile(np.hypot(*(at - middle).T), flux, 0.5)
+        middle = [weighted_quantile(side, flux, 0.5) for side in at.T]
+        return weighted_quantile(np.hypot(*(at - middle).T), flux, 0.5)
 
     best, span = float(centre[2]), reach
     for _ in range(2):
@@ -142,10 +143,3 @@ def _flats(rays: RaySet, centre: Array, reach: float) -> list[Surface]:
     width, height, radius = sides(best)
     middle = (float(centre[0]), float(centre[1]))
     return [Disk(radius, best, middle), Plane(best, 2.0 * width, 2.0 * height, middle)]
-
-
-def _quantile(values: Array, weights: Array, share: float) -> float:
-    """The value that this share of the weights does not exceed."""
-    order = np.argsort(values)
-    summed = np.cumsum(weights[order])
-    return float(values[order][min(int(np.searchsorted(summed, share * summed[-1])), len(order) - 1)])
