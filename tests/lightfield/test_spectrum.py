@@ -10,7 +10,7 @@ import etendue as et
 import h5py
 import numpy as np
 import pytest
-from etendue.errors import ArgumentError, FormatError, UnitError
+from etendue.errors import ArgumentError, FormatError, UnitError, UnknownNameError
 from etendue.lightfield.carrier import Disk
 from etendue.lightfield.light_field import LightField
 from etendue.luminance import scene_map
@@ -275,3 +275,10 @@ def test_scenes_say_what_a_field_says_of_itself(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(scene_map, "fit_or_recall", lambda rays, **_: LightField.fit(rays, sphere, depths=(2, 2, 2, 2)))
     _, notes = told({"kind": "rays", "rays": sided})
     assert sum(note.startswith(lost) for note in notes) == 1
+
+
+def test_lines_of_an_unknown_unit_are_refused() -> None:
+    with pytest.raises(UnknownNameError, match=r"unknown flux unit 'lumen'\. Did you mean 'lm'"):
+        SpectralLines(LINES, SHARES, "lumen")  # type: ignore[arg-type]
+    with pytest.raises(UnknownNameError, match="unknown flux unit 'mW'"):
+        SpectralLines(LINES, SHARES).in_unit("mW")  # type: ignore[arg-type]

@@ -20,6 +20,7 @@ from etendue.quantities.ray_set import RaySet
 from etendue.quantities.report import RayFileWarning
 from etendue.quantities.spectrum import Spectrum, photopic_efficiency
 from etendue.quantities.spool import spool
+from etendue.units import LUMINOUS_EFFICACY_MAX
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate, linalg, stats
@@ -570,6 +571,11 @@ def test_what_the_rays_do_not_know_is_not_guessed(rays: Callable[[], RaySet], un
         rays().in_unit(unit)
 
 
+def test_a_spectrum_that_is_none_is_refused() -> None:
+    with pytest.raises(ArgumentError, match=r"with_spectrum: spectrum is a list; give a Spectrum"):
+        radiometric(3).with_spectrum([[450, 1]])  # type: ignore[arg-type]
+
+
 def test_an_unknown_unit_is_refused() -> None:
     with pytest.raises(UnknownNameError, match="'lumen'"):
         radiometric(3).in_unit("lumen")  # type: ignore[arg-type]
@@ -645,6 +651,28 @@ def test_wavelengths_that_every_set_knows_are_kept() -> None:
     # What a ray says of itself goes before what the header says of all.
     odd = radiometric(2, single_wavelength=620.0)
     assert RaySet.merge([odd, red]).wavelength == pytest.approx([*uneven(2).column("wavelength"), 620.0])
+
+
+def test_wavelengths_beside_spectra_become_spectra_of_a_line() -> None:
+    """K_m V(λ) of each line, and K of the spectrum: a white set of a blue laser, and of a phosphor with a spectrum."""
+    laser = spectral(n=2, single_wavelength=450.0)
+    wide = Spectrum([500.0, 560.0, 650.0], [0.0, 1.0, 0.0])
+    both = RaySet.merge([spectral(n=1, spectra=(wide,)), laser, radiometric(3, wavelength_scale=0.9)])
+    own = 0.9 * uneven(3).column("wavelength")
+    efficacy = [wide.luminous_efficacy, *(LUMINOUS_EFFICACY_MAX * photopic_efficiency([450.0, 450.0, *own]))]
+    np.testing.assert_allclose(both.in_unit("lm").flux, both.flux * efficacy, rtol=1e-12)
+    assert [c.found.rsplit(": ")[-1] for c in both.complaints] == ["stokes, polarisation_axis, additional"]
+    # What a ray says of itself goes before what the header says of all, and an unknown wavelength is no spectrum.
+    odd = radiometric(2, spectra=(wide,))
+    odd.records["wavelength"][0] = -1.0
+    assert RaySet.merge([spectral(n=1, spectra=(wide,)), odd]).column("spectrum_index").tolist() == [1, 0, 2]
+
+
+def test_too_many_wavelengths_beside_spectra_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("etendue.quantities.ray_merge.MOST_LINES", 3)
+    few, many = (RaySet.merge([spectral(n=1, spectra=(A,)), radiometric(n)]) for n in (3, 4))
+    assert (len(few.spectra), len(many.spectra)) == (4, 0)
+    assert [c.found.rsplit(": ")[-1].split(",")[0] for c in many.complaints] == ["spectrum", "wavelength"]
 
 
 def test_columns_that_not_all_sets_have_alike_are_left_out() -> None:

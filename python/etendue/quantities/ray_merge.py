@@ -19,8 +19,12 @@ from etendue.quantities.ray_stream import BATCH, RayBatch
 from etendue.quantities.ray_units import in_unit
 from etendue.quantities.repeated_rays import SharedRays
 from etendue.quantities.report import Complaint
+from etendue.quantities.spectrum import Spectrum
 from etendue.quantities.spool import spool
 from etendue.units import FluxUnit
+
+MOST_LINES = 4096
+"""Different wavelengths of the rays of a set that become spectra of a line each beside sets that have spectra, at most."""
 
 
 def merged(sets: Sequence[Rays], flux: Sequence[float] | None, unit: FluxUnit | None) -> Rays:
@@ -46,7 +50,8 @@ def merged(sets: Sequence[Rays], flux: Sequence[float] | None, unit: FluxUnit | 
         sets = [in_unit(rays, unit) for rays in sets]
 
     single, by_ray = _wavelengths(sets)
-    indexed = all(_knows_spectra(rays) for rays in sets)
+    spectra = [_spectra(rays, or_lines=single is None and not by_ray) for rays in sets]
+    indexed = all(spectra)
     shared = [
         name
         for name in sets[0].columns
@@ -76,11 +81,11 @@ def merged(sets: Sequence[Rays], flux: Sequence[float] | None, unit: FluxUnit | 
                 if by_ray:
                     part["wavelength"] = _column(rays, "wavelength", batch, rays.meaning.single_wavelength)
                 if indexed:
-                    own = _column(rays, "spectrum_index", batch, 1)
+                    own = _numbers(rays, spectra[number], batch)
                     # 0 is no spectrum: an index that was wrong in its file must not point into another's spectra.
-                    part["spectrum_index"] = np.where((own >= 1) & (own <= len(rays.spectra)), before + own, 0)
+                    part["spectrum_index"] = np.where((own >= 1) & (own <= len(spectra[number])), before + own, 0)
                 yield part
-            before += len(rays.spectra)
+            before += len(spectra[number])
 
     records = spool(parts(), dtype)
     meaning = dataclasses.replace(
@@ -89,12 +94,16 @@ def merged(sets: Sequence[Rays], flux: Sequence[float] | None, unit: FluxUnit | 
         stored_flux_scale=1.0,
         length_scale=1.0,
         wavelength_scale=1.0,
-        spectra=tuple(s for rays in sets for s in rays.spectra) if indexed else (),
+        spectra=tuple(s for own in spectra for s in own) if indexed else (),
         single_wavelength=single,
         header=_header(sets),
         copies=max(rays.meaning.copies for rays in sets),
         complaints=(
-            *(_placed(told, rays) for rays in sets for told in (*rays.complaints, *_losses(rays, dtype, single))),
+            *(
+                _placed(told, rays)
+                for rays, own in zip(sets, spectra, strict=True)
+                for told in (*rays.complaints, *_losses(rays, dtype, single, own))
+            ),
             *same.complaints([rays.provenance.source for rays in sets]),
         ),
         provenance=_provenance([rays.provenance for rays in sets]),
@@ -110,8 +119,43 @@ def _wavelengths(sets: Sequence[RayRecords]) -> tuple[float | None, bool]:
     return None, all("wavelength" in rays.columns or rays.meaning.single_wavelength is not None for rays in sets)
 
 
-def _knows_spectra(rays: RayRecords) -> bool:
-    return len(rays.spectra) == 1 or (bool(rays.spectra) and "spectrum_index" in rays.columns)
+def _spectra(rays: RayRecords, *, or_lines: bool) -> tuple[Spectrum, ...]:
+    """The spectra that the rays of a set have, in the order of their numbers; nothing if they are not known.
+
+    With `or_lines`, wavelengths go before them, as in `RaySet.in_unit`, each as a spectrum of one line.
+    """
+    if or_lines and "wavelength" in rays.columns:
+        found = np.zeros(0)
+        for batch in rays.batches():
+            wavelength = _column(rays, "wavelength", batch)
+            found = np.union1d(found, wavelength[(wavelength > 0.0) & np.isfinite(wavelength)])
+            if found.size > MOST_LINES:
+                break
+        if 0 < found.size <= MOST_LINES:
+            return tuple(_line(wavelength) for wavelength in found)
+    elif or_lines and rays.meaning.single_wavelength is not None:
+        return (_line(rays.meaning.single_wavelength),)
+    known = len(rays.spectra) == 1 or "spectrum_index" in rays.columns
+    return rays.spectra if known else ()
+
+
+def _line(wavelength: float) -> Spectrum:
+    return Spectrum(np.array([wavelength]), np.ones(1))
+
+
+def _are_lines(rays: RayRecords, spectra: tuple[Spectrum, ...]) -> bool:
+    """Whether these are not the set's spectra but its wavelengths."""
+    return bool(spectra) and spectra is not rays.spectra
+
+
+def _numbers(rays: RayRecords, spectra: tuple[Spectrum, ...], batch: RayBatch) -> npt.NDArray[Any]:
+    """The number of the spectrum of each ray of a batch, from 1; 0 if its wavelength is not known."""
+    if not _are_lines(rays, spectra):
+        return _column(rays, "spectrum_index", batch, 1)
+    lines = np.array([spectrum.wavelength[0] for spectrum in spectra])
+    wavelength = _column(rays, "wavelength", batch, rays.meaning.single_wavelength)
+    number: npt.NDArray[Any] = np.searchsorted(lines, wavelength)
+    return np.where(lines[np.minimum(number, lines.size - 1)] == wavelength, number + 1, 0)
 
 
 def _column(rays: RayRecords, name: str, batch: RayBatch, otherwise: float | None = None) -> npt.NDArray[Any]:
@@ -139,9 +183,13 @@ def _header(sets: Sequence[RayRecords]) -> dict[str, Any]:
     }
 
 
-def _losses(rays: RayRecords, dtype: np.dtype[Any], single: float | None) -> list[Complaint]:
+def _losses(
+    rays: RayRecords, dtype: np.dtype[Any], single: float | None, spectra: tuple[Spectrum, ...]
+) -> list[Complaint]:
     """What a set knows that records of `dtype` do not hold, because another set does not know it."""
-    kept = dtype.names or ()
+    kept = [*(dtype.names or ())]
+    if "spectrum_index" in kept and _are_lines(rays, spectra):
+        kept.append("wavelength")
     lost = [name for name in rays.columns if name not in kept]
     if rays.meaning.single_wavelength not in (None, single) and "wavelength" not in (*kept, *lost):
         lost.append("wavelength")

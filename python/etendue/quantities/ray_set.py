@@ -144,8 +144,9 @@ class RaySet(RayRecords, InNotebook):
         -------
         RaySet
             Columns that all sets have are kept. The merged set knows the wavelength of every ray if each set does, and
-            the spectrum of every ray, by ``spectrum_index``, if each set does. The complaints name sets that hold the same
-            rays, which are not independent of each other.
+            the spectrum of every ray, by ``spectrum_index``, if each set does; where some have wavelengths, 4096 different
+            ones at most, and others spectra, each wavelength becomes a spectrum of one line. The complaints name sets that
+            hold the same rays, which are not independent of each other.
 
         Raises
         ------

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from etendue.errors import UnitError
-from etendue.quantities.arguments import require_known
+from etendue.quantities.arguments import require, require_known
 from etendue.quantities.ray_records import RayRecords
 from etendue.quantities.ray_rewriting import Rays, column_of, with_flux, without
 from etendue.quantities.ray_stream import FloatArray, RayBatch
@@ -137,6 +137,7 @@ def without_spectrum(rays: Rays) -> Rays:
 
 def with_spectrum(rays: Rays, spectrum: Spectrum) -> Rays:
     """The same rays with one spectrum for all, in place of whatever was known of their spectra and wavelengths."""
+    require(spectrum, Spectrum, "with_spectrum: spectrum", "a Spectrum, as et.Spectrum(wavelength, weight)")
     step = "spectrum given by the user"
     # The ratio of the two totals in the header was that of another spectrum.
     other = "luminous_flux" if rays.flux_unit == "W" else "radiant_flux"

@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.errors import ArgumentError, UnitError
+from etendue.quantities.arguments import require_known
 from etendue.quantities.spectrum import Spectrum, photopic_efficiency
-from etendue.units import LUMINOUS_EFFICACY_MAX, FluxUnit
+from etendue.units import FLUX_UNITS, LUMINOUS_EFFICACY_MAX, FluxUnit
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -31,6 +32,8 @@ class SpectralLines:
     ------
     ArgumentError
         If the arrays differ in length, are empty or not finite, wavelengths do not rise, or there is no flux.
+    UnknownNameError
+        If there is no such unit.
 
     Examples
     --------
@@ -44,6 +47,7 @@ class SpectralLines:
     flux_unit: FluxUnit = "W"
 
     def __post_init__(self) -> None:
+        require_known(self.flux_unit, FLUX_UNITS, "flux unit")
         # The same conditions as for a table over wavelength, which tells what is wrong.
         table = Spectrum(self.wavelength, self.weight)
         if not table.weight.any():
@@ -74,7 +78,10 @@ class SpectralLines:
         ------
         UnitError
             If there are no lumens at any of the wavelengths, or lumens where V(λ) is 0.
+        UnknownNameError
+            If there is no such unit.
         """
+        require_known(flux_unit, FLUX_UNITS, "flux unit")
         if flux_unit == self.flux_unit:
             return self
         efficacy = LUMINOUS_EFFICACY_MAX * photopic_efficiency(self.wavelength)
