@@ -8,8 +8,9 @@ import etendue as et
 import numpy as np
 import pytest
 from etendue.description.files import Files
-from etendue.errors import FormatError, SceneError
+from etendue.errors import ArgumentError, FormatError, SceneError
 from etendue.scene import Scene, compile_scene
+from etendue.scene.finishes import Transmitter
 from etendue.scene.media import Medium, Sellmeier
 from etendue.scene.media_library import MEDIA
 
@@ -101,7 +102,10 @@ def test_files_that_are_no_tables(tmp_path: Path, text: str, words: str) -> None
         ({"index": 1.5, "sellmeier": {"b": [1], "c": [0.01]}}, "'index' and 'sellmeier'"),
         ({"index": 0.9}, "index: is 0.9; it must be at least 1"),
         ({"index": 1.5, "absorption": -1}, "absorption: is -1; it must be at least 0"),
-        ({"index": 1.5, "absorption": {"wavelength": [2, 1], "values": [0, 0]}}, "absorption: 'wavelength' must rise"),
+        (
+            {"index": 1.5, "absorption": {"wavelength": [20, 10], "values": [0, 0]}},
+            "absorption: 'wavelength' must rise",
+        ),
         ({"table": {"wavelength": [400], "values": [1.5, 1.6]}}, "same length"),
         ({"sellmeier": {"b": [1, 2], "c": [0.01]}}, "same length"),
     ],
@@ -146,3 +150,83 @@ def test_absorption_stays_an_array() -> None:
     record = Medium(index=1.5, absorption=0.002).record(Files())
     assert isinstance(record["absorption"]["wavelength"], np.ndarray)
     assert record["absorption"]["per_mm"].tolist() == [0.002]
+
+
+MICROMETRES = {"wavelength": [0.4, 0.7], "values": [0.9, 0.5]}
+
+
+@pytest.mark.parametrize(
+    ("keys", "place"),
+    [
+        ({"wavelength": 0.555}, "wavelength"),
+        ({"sources": [{"kind": "point", "flux": 1, "wavelength": 0.45}]}, r"sources\[0\].wavelength"),
+        ({"sources": [{"kind": "point", "flux": 1, "spectrum": [[0.45, 1]]}]}, r"sources\[0\].spectrum\[0\]\[0\]"),
+        ({"media": {"m": {"index": 1.5, "absorption": MICROMETRES}}}, r"media.m.absorption.wavelength\[0\]"),
+        ({"finishes": {"f": {"kind": "mirror", "reflectance": MICROMETRES}}}, r"reflectance.wavelength\[0\]"),
+    ],
+)
+def test_wavelengths_in_micrometres_are_refused(keys: dict[str, object], place: str) -> None:
+    with pytest.raises(SceneError, match=rf"{place}: is 0\.[0-9]+; wavelengths are in nm, and 10 nm at least"):
+        Scene.from_dict(keys)
+
+
+@pytest.mark.parametrize(
+    "user",
+    [Medium(table={"file": "n.csv"}), Transmitter(transmittance={"file": "n.csv", "by": "wavelength"})],
+    ids=["index", "finish"],
+)
+def test_wavelengths_in_micrometres_of_files_are_refused(tmp_path: Path, user: Medium | Transmitter) -> None:
+    (tmp_path / "n.csv").write_text("0.4, 0.9\n0.7, 0.8\n", encoding="utf-8")
+    with pytest.raises(ArgumentError, match=r"n\.csv: .*wavelengths are in nm, and 10 nm at least"):
+        user.record(Files(tmp_path))
+
+
+def test_light_beyond_tables_is_told() -> None:
+    """Of shares 1, 2, 3 and 4 at 380, 400, 650 and 730 nm, 0.1 lies below 400, 0.5 outside 400 to 700, 0.7 above 400 nm."""
+
+    def noted(**keys: object) -> str:
+        lamps = [
+            {"name": "dim", "kind": "point", "flux": 1, "spectrum": [[400, 1]]},
+            {"name": "lamp", "kind": "point", "flux": 1, "spectrum": [[380, 1], [400, 2], [650, 3], [730, 4]]},
+        ]
+        ball = {
+            "name": "pearl",
+            "shape": {"kind": "ball", "radius": 1},
+            "at": [0, 0, 9],
+            "medium": {"index": 1.5, **keys},
+        }
+        return " | ".join(compile_scene(Scene(sources=lamps, solids=[ball])).notes)
+
+    def table(*wavelength: float, values: tuple[float, ...] = (0.3, 0.1)) -> dict[str, object]:
+        return {"absorption": {"wavelength": wavelength, "values": values}}
+
+    told = "the absorption of 'pearl.medium' is known from {} to {} nm; its last value is taken for {} "
+    told += "of the light of 'lamp'"
+    assert noted(**table(400, 700)) == told.format(400, 700, 0.5) + ", as at 730 nm"
+    assert noted(**table(400, 730)) == told.format(400, 730, 0.1) + ", as at 380 nm"
+    assert noted(**table(100, 400)) == told.format(100, 400, 0.7) + ", as at 730 nm"
+    assert (
+        noted(**table(380, 730))
+        == noted(**table(100, 300, values=(0.1, 0.1)))
+        == noted(**table(300, values=(0.1,)))
+        == ""
+    )
+    bent = {"index": None, "table": {"wavelength": [390, 900], "values": [1.6, 1.5]}}
+    assert noted(**bent) == told.replace("absorption", "index").format(390, 900, 0.1) + ", as at 380 nm"
+
+
+def test_light_beyond_tables_of_finishes_is_told() -> None:
+    sheet = {"name": "sheet", "shape": {"kind": "disk", "radius": 1}, "at": [0, 0, 3]}
+    by_colour = {"wavelength": [500, 600], "values": [0.5, 0.9]}
+    filters = {
+        "f": {"kind": "mixture", "parts": [{"kind": "lambertian", "reflectance": by_colour}], "weights": [1]},
+        "g": {"kind": "transmitter", "transmittance": {"angle": [0, 80], "values": [0.9, 0.1]}},
+    }
+    for name, told in (
+        ("f", "the finish 'f' is known from 500 to 600 nm; its last value is taken for 1 of the light of"),
+        ("g", ""),
+    ):
+        lamp = {"name": "lamp", "kind": "point", "flux": 1, "wavelength": 450}
+        notes = compile_scene(Scene(finishes=filters, sources=[lamp], surfaces=[{**sheet, "finish": name}])).notes
+        assert " ".join(notes).startswith(told)
+        assert bool(notes) == bool(told)

@@ -24,7 +24,7 @@ EVERYTHING: dict[str, Any] = {
         "my plastic": {"index": 1.49, "absorption": 0.001},
         "glass": {
             "sellmeier": {"b": [1.0, 0.5], "c": [0.01, 0.02]},
-            "absorption": {"wavelength": [1, 2], "values": [3, 4]},
+            "absorption": {"wavelength": [410, 720], "values": [3, 4]},
         },
     },
     "finishes": {

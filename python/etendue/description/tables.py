@@ -15,7 +15,16 @@ from pydantic import Discriminator, Tag, model_validator
 from etendue.description.files import Files, read_columns
 from etendue.description.keys import Description
 from etendue.description.mistakes import NUMBER, TABLE
-from etendue.description.values import AsNumber, AsRow, Finite, FirstMistake, Rising, Share, rises
+from etendue.description.values import (
+    SHORTEST_WAVELENGTH,
+    AsNumber,
+    AsRow,
+    Finite,
+    FirstMistake,
+    Rising,
+    Share,
+    rises,
+)
 from etendue.errors import ArgumentError
 
 Array = npt.NDArray[np.float64]
@@ -154,9 +163,12 @@ class ShareTable(Description):
             return self._given()
         path = files.find(self.file)
         nodes, values = read_columns(path).T
-        low, high = (0.0, 90.0) if self.by == "angle" else (1e-9, np.inf)
+        low, high = (0.0, 90.0) if self.by == "angle" else (SHORTEST_WAVELENGTH, np.inf)
         if not (low <= nodes[0] and nodes[-1] <= high and (values >= 0.0).all() and (values <= 1.0).all()):
-            raise ArgumentError(f"{path}: angles must be 0 to 90°, wavelengths above 0 nm, and values 0 to 1")
+            raise ArgumentError(
+                f"{path}: angles must be 0 to 90°, and values 0 to 1; wavelengths are in nm, and "
+                f"{SHORTEST_WAVELENGTH:g} nm at least"
+            )
         if self.by == "angle":
             return Grid(nodes.copy(), np.array([555.0]), values[:, None].copy())
         return Grid(np.array([0.0]), nodes.copy(), values[None, :].copy())

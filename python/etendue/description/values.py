@@ -76,6 +76,16 @@ def _not_tiny(length: float) -> float:
     return length
 
 
+SHORTEST_WAVELENGTH = 10.0
+"""Smallest wavelength [nm] in a scene, where ultraviolet radiation begins. Visible light that is stated in µm is below."""
+
+
+def _in_nanometres(wavelength: float) -> float:
+    if wavelength < SHORTEST_WAVELENGTH:
+        raise ValueError(f"is {wavelength:g}; wavelengths are in nm, and {SHORTEST_WAVELENGTH:g} nm at least")
+    return wavelength
+
+
 Bound = Annotated[float, AsNumber]
 """A number or an infinity."""
 Number = Annotated[float, Finite, AsNumber]
@@ -84,7 +94,7 @@ NotNegative = Annotated[float, Finite, Ge(0.0), AsNumber]
 Length = Annotated[float, Finite, Gt(0.0), Le(LONGEST), AfterValidator(_not_tiny), AsNumber]
 LengthOrZero = Annotated[float, Finite, Ge(0.0), Le(LONGEST), AsNumber]
 Coordinate = Annotated[float, Finite, Ge(-LONGEST), Le(LONGEST), AsNumber]
-Wavelength = Annotated[float, Finite, Gt(0.0), Le(1e9), AsNumber]
+Wavelength = Annotated[float, Finite, Gt(0.0), Le(1e9), AfterValidator(_in_nanometres), AsNumber]
 Share = Annotated[float, Finite, Ge(0.0), Le(1.0), AsNumber]
 Index = Annotated[int, Ge(0), Le((1 << 31) - 1), AsCount]
 Pixels = Annotated[int, Ge(1), Le(65536), AsCount]

@@ -20,7 +20,7 @@ from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.spectrum import photopic_efficiency
 from etendue.scatter.members import same_when_turned
 from etendue.scene.bodies.body import Body
-from etendue.scene.colour_dependence import telling_finishes, telling_media
+from etendue.scene.colour_dependence import telling_finishes, telling_media, told_beyond
 from etendue.scene.face_rows import BodyFaces, FaceGathering, FaceRows
 from etendue.scene.finishes import BUILT_IN, Finish, Interface
 from etendue.scene.media import Medium
@@ -277,9 +277,10 @@ class _Compiler:
                     self.notes.append(f"{known} and is extrapolated to {outside[0]:g} nm")
 
     def _check_colours(self) -> None:
-        """Light whose colour is known of all of it together only, and things that treat its colours differently."""
+        """Light beyond the wavelengths of tables; and such as is treated by colours that are known of all of it together."""
         if self.mistakes:
             return
+        self.notes += told_beyond(self.rows, self.names)
         for name, wavelengths in self.means.items():
             things = [*telling_media(self.rows["media"], self.names["media"], wavelengths),
                       *telling_finishes(self.rows["finishes"], self.names["finishes"], wavelengths)]  # fmt: skip

@@ -14,7 +14,17 @@ from pydantic import Discriminator, Tag, model_validator
 from etendue.description.files import Files, read_columns
 from etendue.description.keys import Description
 from etendue.description.mistakes import BY_NAME, DESCRIBED, NUMBER, TABLE
-from etendue.description.values import AsNumber, AsRow, Finite, FirstMistake, NotNegative, Number, Rising, rises
+from etendue.description.values import (
+    SHORTEST_WAVELENGTH,
+    AsNumber,
+    AsRow,
+    Finite,
+    FirstMistake,
+    NotNegative,
+    Number,
+    Rising,
+    rises,
+)
 from etendue.errors import ArgumentError
 from etendue.units import NM_PER_UM
 
@@ -64,7 +74,7 @@ class Spectral(Description):
         FormatError
             If the file is no table.
         ArgumentError
-            If a wavelength of the file is not above 0, or a value is negative.
+            If a wavelength of the file is below 10 nm, or a value is negative.
         OSError
             If the file cannot be opened.
         """
@@ -72,8 +82,10 @@ class Spectral(Description):
             return np.array(self.wavelength), np.array(self.values)
         path = files.find(self.file)
         columns = read_columns(path)
-        if columns[0, 0] <= 0.0 or (columns[:, 1] < 0.0).any():
-            raise ArgumentError(f"{path}: wavelengths must be above 0 nm, and values not negative")
+        if columns[0, 0] < SHORTEST_WAVELENGTH or (columns[:, 1] < 0.0).any():
+            raise ArgumentError(
+                f"{path}: wavelengths are in nm, and {SHORTEST_WAVELENGTH:g} nm at least, and values must not be negative"
+            )
         return columns[:, 0].copy(), columns[:, 1].copy()
 
 
