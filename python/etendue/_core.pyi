@@ -24,6 +24,7 @@ __all__ = [
     "Survey",
     "TreeMemory",
     "batch_size",
+    "chord_error",
     "cone_sums",
     "count_rays",
     "cross_parts",
@@ -39,7 +40,10 @@ __all__ = [
     "look_at_events",
     "look_at_scene",
     "losses",
+    "mesh_facets",
+    "mesh_shells",
     "node_values",
+    "open_edges",
     "polya_average",
     "polya_evidence",
     "polya_posterior",
@@ -52,7 +56,10 @@ __all__ = [
     "scan_colours",
     "scene_crossings",
     "select_subset",
+    "smooth_normals",
     "trace_trails",
+    "weld",
+    "weld_mesh",
     "work_unit",
 ]
 
@@ -330,6 +337,33 @@ def kept_ray_keys(
     source: _Source, ranges: Sequence[tuple[int, int]], every: int, threads: int | None = None
 ) -> tuple[npt.NDArray[np.uint64], _Floats]:
     """Keys that are multiples of `every`, and the flux, of the rays of ranges (start, stop) that have flux."""
+
+def weld(vertices: _Floats) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32]]:
+    """Of vertices (n, 3) one at each place, in rising order of x, y and z, and for each vertex the number of its place."""
+
+def weld_mesh(
+    vertices: _Floats, triangles: npt.NDArray[np.uint32]
+) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32]]:
+    """The vertices that triangles (m, 3) with an area use, one at each place, by x, y and z; those triangles."""
+
+def mesh_facets(
+    vertices: _Floats, triangles: npt.NDArray[np.uint32], limits: Sequence[float]
+) -> tuple[_Floats, _Floats]:
+    """Area of each triangle (m,), and the largest angle [turns] between it and a neighbour, of those between two limits."""
+
+def chord_error(vertices: _Floats, normals: _Floats, triangles: npt.NDArray[np.uint32]) -> float:
+    """Largest distance between triangles (m, 3) and the surface whose unit normals (n, 3) they have at their corners."""
+
+def open_edges(triangles: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
+    """Edges (k, 2) that are not shared by two triangles with opposite senses, in rising order."""
+
+def mesh_shells(triangles: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
+    """The number of the shell of each triangle (m,), from 0: triangles that share an edge are of one."""
+
+def smooth_normals(
+    vertices: _Floats, triangles: npt.NDArray[np.uint32], least: float
+) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32], _Floats]:
+    """Which vertex each new one was, triangles over these, and unit normals: means over those of at least this cosine."""
 
 def read_colours(source: _Source, start: int, stop: int) -> _Floats:
     """What the records of rays ``start..stop`` state of their colours, as they were opened, shape (n,); (0,) if nothing."""

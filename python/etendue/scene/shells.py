@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from etendue import _core
 from etendue.scene.triangles import directed_areas
 
 Array = npt.NDArray[np.float64]
@@ -60,7 +61,7 @@ def senses(vertices: Array, triangles: Triangles) -> Senses:
     >>> senses(np.concatenate([corners, corners + 5]), np.concatenate([faces, faces[:, ::-1] + 4])).inward.tolist()
     [False, False, False, False, True, True, True, True]
     """
-    shell = _shells(triangles)
+    shell = _core.mesh_shells(np.ascontiguousarray(triangles, dtype=np.uint32)).astype(np.intp)
     doubled, corner = directed_areas(vertices, triangles)
     volumes = np.bincount(shell, np.einsum("ij,ij->i", doubled, corner - vertices.mean(axis=0)))
     around = _around(vertices, triangles, shell, doubled) if 1 < len(volumes) <= MOST_SHELLS else None
@@ -76,23 +77,6 @@ def senses(vertices: Array, triangles: Triangles) -> Senses:
             twice = vertices[triangles[shell == k][0, 0]]
         inward[k] = inward[outer]
     return Senses(inward[shell], twice)
-
-
-def _shells(triangles: Triangles) -> npt.NDArray[np.intp]:
-    """The number of the shell that each triangle belongs to, from 0: triangles that share an edge are of one."""
-    edges = np.sort(np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
-    order = np.lexsort((edges[:, 1], edges[:, 0]))
-    a, b = np.tile(np.arange(len(triangles)), 3)[order].reshape(-1, 2).T
-    label = np.arange(len(triangles))
-    while True:
-        left, right = label[a], label[b]
-        if (left == right).all():
-            return np.unique(label, return_inverse=True)[1].reshape(-1)
-        least = np.minimum(left, right)
-        np.minimum.at(label, left, least)
-        np.minimum.at(label, right, least)
-        while (label != label[label]).any():
-            label = label[label]
 
 
 def _around(

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from etendue import _core
 from etendue.errors import FormatError, UnknownNameError
 from etendue.scene.open_cascade import OpenCascade
 from etendue.scene.triangles import as_written, chord_error, open_edges, smooth_where_round, volume, welded
@@ -294,8 +295,8 @@ def _closed_runs(part: _Part) -> list[Triangles]:
     What touches another body may share its corners, so corners alone do not tell. Holes within a body are surfaces of
     their own, inside out.
     """
-    _, corner = np.unique(part.vertices, axis=0, return_inverse=True)
-    triangles = corner.reshape(-1)[part.triangles]
+    _, corner = _core.weld(np.ascontiguousarray(part.vertices))
+    triangles = corner.astype(np.int64)[part.triangles]
     component = _components(triangles)[triangles[:, 0]]
     # Faces by what hangs together, and there in their order.
     faces, first, place = np.unique(part.faces, return_index=True, return_inverse=True)

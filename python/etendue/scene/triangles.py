@@ -5,16 +5,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from etendue import _core
 from etendue.errors import ArgumentError
 
 Array = npt.NDArray[np.float64]
 Triangles = npt.NDArray[np.int64]
 
-BLOCK = 1 << 24
-"""Pairs of corners that are compared at once."""
-
 MOST_PAIRS = 1 << 34
-"""Pairs of triangles around one vertex, of all vertices together: some minutes. Bodies have some twenty per triangle."""
+"""Pairs of triangles around one vertex, of all vertices together: a minute. Bodies have some twenty per triangle."""
 
 PLANE = 3e-6
 """Normals in single precision that differ by less from that of a triangle are its own."""
@@ -49,12 +47,8 @@ def welded(vertices: Array, triangles: Triangles) -> tuple[Array, Triangles]:
     >>> len(kept), faces.tolist()
     (4, [[0, 2, 1], [2, 3, 1]])
     """
-    kept, number = np.unique(vertices, axis=0, return_inverse=True)
-    triangles = number.reshape(-1)[triangles]
-    normals, _ = directed_areas(kept, triangles)
-    triangles = triangles[(normals != 0.0).any(axis=1)]
-    used, number = np.unique(triangles, return_inverse=True)
-    return kept[used], number.reshape(-1, 3)
+    kept, corners = _core.weld_mesh(_points(vertices), _corners(triangles))
+    return vertices[kept], corners.astype(np.int64)
 
 
 def as_written(numbers: Array) -> Array:
@@ -120,14 +114,7 @@ def open_edges(triangles: Triangles) -> Triangles:
     >>> open_edges(np.array([[0, 1, 2], [2, 1, 3]])).tolist()
     [[0, 1], [0, 2], [1, 3], [2, 3]]
     """
-    directed = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
-    forward = directed[:, 0] < directed[:, 1]
-    edges, number = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True)
-    number = number.reshape(-1)
-    one_way = np.bincount(number[forward], minlength=len(edges))
-    other_way = np.bincount(number[~forward], minlength=len(edges))
-    found: Triangles = edges[(one_way != 1) | (other_way != 1)]
-    return found
+    return _core.open_edges(_corners(triangles)).astype(np.int64)
 
 
 def smooth_normals(vertices: Array, triangles: Triangles, crease_angle: float) -> tuple[Array, Triangles, Array]:
@@ -163,36 +150,16 @@ def smooth_normals(vertices: Array, triangles: Triangles, crease_angle: float) -
     >>> len(smooth_normals(roof, faces, 30)[0]), len(smooth_normals(roof, faces, 5)[0])
     (4, 6)
     """
-    doubled, _ = directed_areas(vertices, triangles)
-    # Scaled before the norm, so that no triangle is too small or too large for its square.
-    doubled = doubled / np.abs(doubled).max(axis=1, keepdims=True)
-    normals = doubled / np.linalg.norm(doubled, axis=1, keepdims=True)
-    weighted = normals[:, None, :] * _corner_angles(vertices, triangles)[:, :, None]
-    corner_vertex = triangles.reshape(-1)
-    order = np.argsort(corner_vertex, kind="stable")
-    owner, weighted = normals.repeat(3, axis=0)[order], weighted.reshape(-1, 3)[order]
-    found = np.zeros_like(weighted)
-    starts = np.searchsorted(corner_vertex[order], np.arange(len(vertices) + 1))
-    valences = np.diff(starts)
+    valences = np.bincount(triangles.reshape(-1))
     pairs = int((valences.astype(np.float64) ** 2).sum())
     if pairs > MOST_PAIRS:
         raise ArgumentError(
             f"up to {valences.max():,} triangles of the mesh meet at one vertex: {pairs:,} pairs of them would have to be "
             f"compared for smooth normals, and {MOST_PAIRS:,} are allowed. Export the body anew, or leave crease_angle out."
         )
-    least = np.cos(np.radians(crease_angle))
-    for valence in np.unique(valences[valences > 0]):
-        first = starts[:-1][valences == valence]
-        step = max(1, BLOCK // int(valence) ** 2)
-        for at in range(0, len(first), step):
-            rows = first[at : at + step, None] + np.arange(valence)
-            _mean_within(owner, weighted, rows, least, found)
-    found /= np.linalg.norm(found, axis=1, keepdims=True)
-    corner_normal = np.zeros_like(found)
-    corner_normal[order] = found
-    key = np.concatenate([corner_vertex[:, None].astype(np.float64), corner_normal], axis=1)
-    split, number = np.unique(key, axis=0, return_inverse=True)
-    return vertices[split[:, 0].astype(np.int64)], number.reshape(-1, 3), np.ascontiguousarray(split[:, 1:])
+    least = float(np.cos(np.radians(crease_angle)))
+    vertex, split, normals = _core.smooth_normals(_points(vertices), _corners(triangles), least)
+    return vertices[vertex], split.astype(np.int64), normals
 
 
 def smooth_where_round(vertices: Array, triangles: Triangles, normals: Array) -> Array | None:
@@ -234,10 +201,7 @@ def smooth_where_round(vertices: Array, triangles: Triangles, normals: Array) ->
 def chord_error(vertices: Array, triangles: Triangles, normals: Array) -> float:
     """Largest distance between triangles and the surface whose normals they have at their corners.
 
-    Between two corners with unit normals a and b, e from one to the other, a surface that is quadratic along the way is
-    |(b - a)·e|/8 from its chord in the middle. Over a triangle such heights s₁, s₂, s₃ over its sides make
-    4 (s₁ v w + s₂ w u + s₃ u v) in barycentric coordinates: 4/9 (s₁ + s₂ + s₃) at the centroid. Exact but for terms of
-    fourth order in the size of the triangles.
+    Exact but for terms of fourth order in the size of the triangles, if the surface is quadratic along each side.
 
     Parameters
     ----------
@@ -262,11 +226,7 @@ def chord_error(vertices: Array, triangles: Triangles, normals: Array) -> float:
     >>> round(chord_error(ring, np.array([[0, 1, 1]]), ring), 3)
     0.073
     """
-    corner, normal = vertices[triangles], normals[triangles]
-    sides = np.roll(corner, -1, axis=1) - corner
-    heights = np.einsum("ijk,ijk->ij", np.roll(normal, -1, axis=1) - normal, sides) / 8.0
-    middle = np.abs(heights.sum(axis=1)) * (4.0 / 9.0)
-    return float(max(np.abs(heights).max(initial=0.0), middle.max(initial=0.0)))
+    return _core.chord_error(_points(vertices), _points(normals), _corners(triangles))
 
 
 def facet_angle(vertices: Array, triangles: Triangles, crease_angle: float) -> float:
@@ -281,21 +241,9 @@ def facet_angle(vertices: Array, triangles: Triangles, crease_angle: float) -> f
     >>> round(facet_angle(roof, np.array([[0, 2, 1], [0, 1, 3]]), 30), 1)
     11.4
     """
-    doubled, _ = directed_areas(vertices, triangles)
-    area = np.linalg.norm(doubled, axis=1)
-    normal = doubled / np.where(area > 0.0, area, 1.0)[:, None]
-    edges = np.sort(np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
-    owner = np.tile(np.arange(len(triangles)), 3)
-    order = np.lexsort((edges[:, 1], edges[:, 0]))
-    edges, owner = edges[order], owner[order]
-    pair = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
-    a, b = owner[pair], owner[pair + 1]
-    across = np.linalg.norm(np.cross(normal[a], normal[b]), axis=1)
-    turn = np.degrees(np.arctan2(across, np.einsum("ij,ij->i", normal[a], normal[b])))
-    bent = (turn > SMALLEST_TURN) & (turn < crease_angle)
-    largest = np.zeros(len(triangles))
-    np.maximum.at(largest, a[bent], turn[bent])
-    np.maximum.at(largest, b[bent], turn[bent])
+    limits = SMALLEST_TURN / 360.0, crease_angle / 360.0
+    area, turns = _core.mesh_facets(_points(vertices), _corners(triangles), limits)
+    largest = 360.0 * turns
     if area[largest > 0.0].sum() < CURVED * area.sum():
         return 0.0
     curved = np.flatnonzero(largest > 0.0)
@@ -304,21 +252,11 @@ def facet_angle(vertices: Array, triangles: Triangles, crease_angle: float) -> f
     return float(largest[curved[np.searchsorted(sums, sums[-1] / 2.0)]])
 
 
-def _mean_within(owner: Array, weighted: Array, rows: Triangles, least: float, found: Array) -> None:
-    """For corners in rows of one vertex each: sums of weighted normals within the crease."""
-    width = max(1, BLOCK // rows.size)
-    for at in range(0, rows.shape[1], width):
-        own = rows[:, at : at + width]
-        alike = np.einsum("vik,vjk->vij", owner[own], owner[rows]) >= least
-        alike |= own[:, :, None] == rows[:, None, :]  # a triangle is like itself, whatever rounding says
-        found[own] = np.einsum("vij,vjk->vik", alike.astype(np.float64), weighted[rows])
+def _points(places: Array) -> Array:
+    """Places, or normals, as the core takes them."""
+    return np.ascontiguousarray(places, dtype=np.float64)
 
 
-def _corner_angles(vertices: Array, triangles: Triangles) -> Array:
-    """Inner angle at every corner [rad], shape (m, 3)."""
-    corner = vertices[triangles]
-    ahead, back = np.roll(corner, -1, axis=1) - corner, np.roll(corner, 1, axis=1) - corner
-    scale = np.maximum(np.abs(ahead).max(axis=2), np.abs(back).max(axis=2))[:, :, None]
-    ahead, back = ahead / scale, back / scale
-    angles: Array = np.arctan2(np.linalg.norm(np.cross(ahead, back), axis=2), np.einsum("ijk,ijk->ij", ahead, back))
-    return angles
+def _corners(triangles: Triangles) -> npt.NDArray[np.uint32]:
+    """Numbers of vertices as the core takes them."""
+    return np.ascontiguousarray(triangles, dtype=np.uint32)

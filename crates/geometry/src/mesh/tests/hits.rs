@@ -210,35 +210,6 @@ fn points_are_drawn_in_proportion_to_area() {
 }
 
 #[test]
-fn edges_are_open_where_the_surface_is() {
-    let (vertices, triangles) = icosphere(1, 3);
-    let open = |vertices: &[Vec3], triangles: &[[u32; 3]]| {
-        Mesh::new(vertices.to_vec(), triangles.to_vec(), None)
-            .expect("a mesh")
-            .open_edges()
-    };
-    assert_eq!(open(&vertices, &triangles), Vec::<[u32; 2]>::new());
-    // Every triangle with vertices of its own, at the same places.
-    let own: Vec<Vec3> = triangles.iter().flatten().map(|i| vertices[*i as usize]).collect();
-    let apart: Vec<[u32; 3]> = (0..triangles.len() as u32)
-        .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
-        .collect();
-    assert_eq!(open(&own, &apart), Vec::<[u32; 2]>::new());
-    let [a, b, c] = triangles[5];
-    let mut rim = [[a, b], [b, c], [c, a]].map(|[p, q]| [p.min(q), p.max(q)]);
-    rim.sort_unstable();
-    let mut hole = triangles.clone();
-    hole.remove(5);
-    assert_eq!(open(&vertices, &hole), rim);
-    let mut turned = triangles.clone();
-    turned[5] = [a, c, b];
-    assert_eq!(open(&vertices, &turned), rim);
-    let mut doubled = triangles;
-    doubled.push([a, b, c]);
-    assert_eq!(open(&vertices, &doubled), rim);
-}
-
-#[test]
 fn what_is_no_mesh_is_refused_with_its_place() {
     let p = |x: f64, y: f64| Vec3::new(x, y, 0.0);
     let three = vec![p(0.0, 0.0), p(1.0, 0.0), p(0.0, 1.0)];

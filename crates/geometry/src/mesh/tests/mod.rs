@@ -1,3 +1,4 @@
 mod distance;
 mod hits;
 mod meshes;
+mod topology;
