@@ -366,6 +366,7 @@ def test_a_measurement_in_a_file(run: et.NearFieldRun, tmp_path: Path) -> None:
     again = et.NearFieldRun.load(run.save(tmp_path / "lamp.h5"))
     assert again.setting.camera == run.setting.camera
     assert again.total_flux == run.total_flux
+    assert again.total_flux_error == run.total_flux_error > 0.0
     assert (again.ray_set(500, seed=2).direction == run.ray_set(500, seed=2).direction).all()
     assert again.provenance == run.provenance
 
@@ -383,6 +384,12 @@ def test_damaged_files_are_refused(tmp_path: Path) -> None:
         with h5py.File(path, "r+") as file:
             file[name][-1] = values
         with pytest.raises(FormatError, match=name):
+            et.NearFieldRun.load(path)
+    for value, told in ((-1.0, "flux_error"), (math.nan, "flux_error")):
+        path.write_bytes(whole)
+        with h5py.File(path, "r+") as file:
+            file.attrs["flux_error"] = value
+        with pytest.raises(FormatError, match=told):
             et.NearFieldRun.load(path)
 
 

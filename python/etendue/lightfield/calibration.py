@@ -256,12 +256,12 @@ def _draw(known: FloatArray, counts: PartCounts, base: Base, symmetry: str, seed
     grid = generator.poisson(known * (counts.grid.rays / order(symmetry))).astype(np.float64)
     if base.name == "uniform":
         return PartCounts(Sums(sum_of_images(grid, symmetry), None), counts.space, counts.direction)
-    space = _refine(grid.sum(axis=(2, 3)), base.space, generator)
-    direction = _refine(grid.sum(axis=(0, 1)), base.direction, generator)
+    space = dealt_to_fine(grid.sum(axis=(2, 3)), base.space, generator)
+    direction = dealt_to_fine(grid.sum(axis=(0, 1)), base.direction, generator)
     return PartCounts(*(Sums(sum_of_images(cells, symmetry), None) for cells in (grid, space, direction)))
 
 
-def _refine(coarse: FloatArray, fine: FloatArray | None, generator: np.random.Generator) -> FloatArray:
+def dealt_to_fine(coarse: FloatArray, fine: FloatArray | None, generator: np.random.Generator) -> FloatArray:
     """The counts of coarse cells dealt out to the fine cells within them, by the fine density."""
     if fine is None:
         return coarse

@@ -23,6 +23,7 @@ from etendue.quantities.arguments import as_point, require_callable, require_num
 from etendue.quantities.observer import Observer, Screen
 from etendue.quantities.ray_stream import checked_seed, checked_threads
 from etendue.quantities.spool import Spool
+from etendue.units import MM2_PER_M2
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -198,9 +199,12 @@ class NearFieldGoniophotometer:
         stops, seen, light, light_error, brightest = self._look(source, setting, around, seed, progress)
         if not brightest > 0.0:
             raise ArgumentError(f"{source.name}: no light was seen from any position.")
+        light_error, integral_error = source.errors_of_readings(setting.positions, light, light_error)
         if self.photometer_error:
             rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, 1))))
-            light_error = np.hypot(light_error, self.photometer_error * light)
+            own = self.photometer_error * light
+            light_error = np.hypot(light_error, own)
+            integral_error = math.hypot(integral_error, float(np.linalg.norm(setting.positions.weight * own)))
             light = light * (1.0 + self.photometer_error * rng.standard_normal(light.size))
         start, counts = self._exposed(seen, stops, brightest, seed, workers)
         return NearFieldRun(
@@ -212,6 +216,7 @@ class NearFieldGoniophotometer:
             source.flux_unit,
             source.provenance.then(f"near-field goniophotometer: {len(self.positions)} positions, seed {seed}"),
             source.notes,
+            integral_error * setting.photometer_distance**2 / MM2_PER_M2,
         )
 
     def _setting(self, lamp: Lamp) -> tuple[Setting, float]:

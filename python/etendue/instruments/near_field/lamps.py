@@ -12,6 +12,8 @@ import numpy.typing as npt
 
 from etendue.concurrency import in_order
 from etendue.errors import ArgumentError
+from etendue.instruments.near_field.field_errors import field_errors
+from etendue.instruments.near_field.positions import ArmPositions
 from etendue.lightfield.fit_cache import fit_or_recall
 from etendue.lightfield.light_field import LightField
 from etendue.lightfield.pilot_sample import pilot_sample
@@ -48,8 +50,8 @@ LEAST = 4
 """Of a pixel."""
 
 OF_THE_FIELD = (
-    "the lamp is a light field: errors of the readings are those of the field in each pixel, as if independent; "
-    "where neighbours err together they are larger"
+    "the lamp is a light field: errors of the readings and of their integral are what they vary by between sets of as many "
+    "rays; what the field smooths comes on top"
 )
 
 FEW = 1 << 12
@@ -87,6 +89,23 @@ class Lamp(abc.ABC):
     def reach(self, centre: Sequence[float]) -> tuple[float, float]:
         """How far from a point the lines of nearly all light pass, and those of all of it [mm]."""
 
+    def errors_of_readings(self, stops: ArmPositions, light: Array, light_error: Array) -> tuple[Array, float]:
+        """Standard errors of the readings and of their integral over the sphere; independent unless a lamp knows better.
+
+        Parameters
+        ----------
+        stops : ArmPositions
+            Where they were taken.
+        light, light_error : array, shape (n,)
+            Readings, and their errors as if all pixels were independent.
+
+        Returns
+        -------
+        tuple of array, shape (n,), and float
+            In the same unit, and in that times sr.
+        """
+        return np.broadcast_to(light_error, light.shape), float(np.linalg.norm(stops.weight * light_error))
+
     @abc.abstractmethod
     def images(self, observers: Sequence[Observer], screen: Screen) -> Iterator[tuple[Array, Array | None]]:
         """Mean luminance of each pixel and, where it is known, its sampling error; image by image, shape (rows, columns)."""
@@ -100,19 +119,21 @@ class FieldLamp(Lamp):
     field : LightField
     samples : int, optional
         Points within each pixel.
+    seed : int
+        Of rays drawn anew.
     threads : int, optional
 
     Examples
     --------
     >>> import etendue as et
     >>> rings = et.RingSource(rays=2000)
-    >>> lamp = FieldLamp(et.LightField.fit(rings, et.Disk(radius=30), depths=(2, 2, 2, 2)), None, None)
+    >>> lamp = FieldLamp(et.LightField.fit(rings, et.Disk(radius=30), depths=(2, 2, 2, 2)), None, 1, None)
     >>> round(lamp.reach((0.0, 0.0, 0.0))[1])
     30
     """
 
-    def __init__(self, field: LightField, samples: int | None, threads: int | None) -> None:
-        self._field, self._samples, self._threads = field, samples, threads
+    def __init__(self, field: LightField, samples: int | None, seed: int, threads: int | None) -> None:
+        self._field, self._samples, self._seed, self._threads = field, samples, seed, threads
         self._some = probe(field)
         self.name, self.flux_unit = field.provenance.source, field.flux_unit
         self.provenance, self.notes = field.provenance, (*field.notes, OF_THE_FIELD)
@@ -125,6 +146,10 @@ class FieldLamp(Lamp):
         """From some rays that are drawn from the field."""
         off = np.linalg.norm(np.cross(self._some.position - np.asarray(centre), self._some.direction), axis=1)
         return float(np.quantile(off, NEARLY_ALL)), float(off.max())
+
+    def errors_of_readings(self, stops: ArmPositions, light: Array, light_error: Array) -> tuple[Array, float]:
+        """All positions see the same rays."""
+        return field_errors(self._field, stops, light, light_error, self._seed, self._threads)
 
     def images(self, observers: Sequence[Observer], screen: Screen) -> Iterator[tuple[Array, Array | None]]:
         """By quadrature over each pixel, with the standard error of the field there, beside which that of the quadrature is
@@ -311,7 +336,7 @@ def lamp_of(
     size : number, optional
         Diameter of a ball about the origin that holds a function's lamp [mm].
     seed : int
-        Of lines of sight.
+        Of lines of sight, and of rays drawn anew.
     threads : int, optional
         All cores if None.
 
@@ -334,9 +359,9 @@ def lamp_of(
     if isinstance(source, Scene):
         return SceneLamp(source, None if samples is None else max(samples, 2), seed, threads)
     if isinstance(source, LightField):
-        return FieldLamp(source, samples, threads)
+        return FieldLamp(source, samples, seed, threads)
     if isinstance(source, RayStream):
-        return FieldLamp(fit_or_recall(source, threads=threads), samples, threads)
+        return FieldLamp(fit_or_recall(source, threads=threads), samples, seed, threads)
     if callable(source):
         return FunctionLamp(source, size, samples, seed)
     raise ArgumentError(

@@ -92,6 +92,11 @@ class ArmPositions:
         return np.concatenate([[0.0], np.tile(self.planes, self.rings.size - 2), [0.0]])
 
     @property
+    def directions(self) -> Array:
+        """Unit vectors to all positions, shape (n, 3)."""
+        return _directions(self.gamma, self.c)
+
+    @property
     def weight(self) -> Array:
         """Solid angle that each position counts for [sr], shape (n,): 4π together.
 
@@ -183,7 +188,7 @@ class ArmPositions:
     def nearest(self, gamma: float, c: float) -> int:
         """The position closest to a direction."""
         towards = _directions(np.array([float(gamma)]), np.array([float(c)]))[0]
-        return int(np.argmax(_directions(self.gamma, self.c) @ towards))
+        return int(np.argmax(self.directions @ towards))
 
     def drawn(self, stops: npt.NDArray[np.intp], rng: np.random.Generator) -> Array:
         """A direction near each of some positions, drawn with the weight that they have in between, shape (n, 3).

@@ -78,6 +78,8 @@ class NearFieldRun:
     provenance : Provenance
     source_notes : tuple of str
         What the lamp has to tell.
+    flux_error : number, optional
+        Standard error of `total_flux` [`flux_unit`]; None: that of independent readings.
 
     Examples
     --------
@@ -96,6 +98,7 @@ class NearFieldRun:
     flux_unit: FluxUnit
     provenance: Provenance
     source_notes: tuple[str, ...] = ()
+    flux_error: float | None = None
 
     def __repr__(self) -> str:
         """Positions, lit pixels, flux."""
@@ -114,11 +117,13 @@ class NearFieldRun:
 
     @property
     def total_flux_error(self) -> float:
-        """Standard error of `total_flux` by that of the readings [`flux_unit`].
+        """Standard error of `total_flux` by that of the readings [`flux_unit`], and by what they err together.
 
         What the integral misses between positions is not in it; `notes` tell where a beam is too narrow for their steps, or
         the light changes too much between them.
         """
+        if self.flux_error is not None:
+            return self.flux_error
         square = self.setting.photometer_distance**2 / MM2_PER_M2
         return float(np.linalg.norm(self.setting.positions.weight * self.illuminance_error)) * square
 
@@ -448,7 +453,7 @@ class NearFieldRun:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write all that was recorded to an HDF5 file; docs/formats/near-field-runs.md describes it."""
         parts = (self.setting, self.illuminance, self.illuminance_error, self.start, self.records)
-        facts = (self.flux_unit, self.provenance, self.source_notes)
+        facts = (self.flux_unit, self.provenance, self.source_notes, self.flux_error)
         return write_run(as_path(path), *parts, *facts)
 
     @staticmethod

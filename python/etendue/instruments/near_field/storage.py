@@ -32,9 +32,21 @@ FOREIGN = "Give a file (.h5) that `etendue goniophotometer` or NearFieldRun.save
 
 LENGTHS = ("distance", "photometer_distance", "field_of_view", "lamp_size")
 STEPS = ("step_gamma", "step_c")
+FLUX_ERROR = "flux_error"
+"""Files of before it was kept lack it."""
 
 Array = npt.NDArray[np.float64]
-Parts = tuple[Setting, Array, Array, npt.NDArray[np.intp], npt.NDArray[np.void], FluxUnit, Provenance, tuple[str, ...]]
+Parts = tuple[
+    Setting,
+    Array,
+    Array,
+    npt.NDArray[np.intp],
+    npt.NDArray[np.void],
+    FluxUnit,
+    Provenance,
+    tuple[str, ...],
+    float | None,
+]
 
 
 def is_run_file(path: Path) -> bool:
@@ -58,6 +70,7 @@ def write_run(
     flux_unit: FluxUnit,
     provenance: Provenance,
     notes: tuple[str, ...],
+    flux_error: float | None,
 ) -> Path:
     """See `NearFieldRun.save`, which shows it."""
     import h5py  # noqa: PLC0415
@@ -66,6 +79,7 @@ def write_run(
     with atomic_output(path) as temporary, h5py.File(temporary, "w", libver=LIBRARY, locking=False) as file:
         put(file, format=NEAR_FIELD, version=VERSION, flux_unit=flux_unit)
         put(file, provenance=json.dumps(provenance.to_dict()), notes=json.dumps(list(notes)))
+        put(file, **({} if flux_error is None else {FLUX_ERROR: flux_error}))
         put(file, centre=np.array(setting.centre), **{name: getattr(setting, name) for name in LENGTHS})
         put(file, **{name: getattr(setting.positions, name) for name in STEPS})
         put(file.create_group("camera"), **{f.name: float(getattr(setting.camera, f.name)) for f in _camera_fields()})
@@ -104,7 +118,10 @@ def read_run(path: Path) -> Parts:
         notes = strict_json(node.text("notes"))
         if not (isinstance(notes, list) and all(isinstance(note, str) for note in notes)):
             raise node.error("attribute 'notes'", "no list of texts")
-        return setting, *light, start, records, unit, provenance, tuple(notes)
+        flux_error = node.number(FLUX_ERROR) if FLUX_ERROR in node.node.attrs else None
+        if flux_error is not None and flux_error < 0.0:
+            raise node.error(f"attribute {FLUX_ERROR!r}", f"{flux_error:g}, below 0")
+        return setting, *light, start, records, unit, provenance, tuple(notes), flux_error
 
 
 def _setting(node: Node) -> Setting:
