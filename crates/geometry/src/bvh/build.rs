@@ -5,12 +5,16 @@
 //! Two levels of children are then pulled up until a node has eight: always those of the child with the largest area.
 
 use etendue_math::Vec3;
+use etendue_sampling::ordered::inside;
 
 use super::probe::WIDTH;
 use super::tree::{Bvh, DEPTH, LEAF, Node};
 use crate::bounds::Bounds;
 
 const BINS: usize = 16;
+
+/// Primitives from which on both sides of a split are worked on at once.
+const LARGE: usize = 1 << 14;
 
 /// A set of primitives: split in two, or a leaf.
 struct Set {
@@ -42,27 +46,33 @@ impl Bvh {
 
 fn build(bounds: &[Bounds], leaf: usize) -> Option<Bvh> {
     let count = u32::try_from(bounds.len()).ok().filter(|n| *n < LEAF)?;
-    let mut items: Vec<Item> = bounds
-        .iter()
-        .zip(0..count)
-        .map(|(b, primitive)| Item {
-            bounds: unbounded_where_nan(*b),
-            centre: centre(*b),
-            primitive,
-        })
-        .collect();
-    let mut splitter = Splitter {
-        leaf: leaf.max(1),
-        sets: Vec::new(),
+    let splitter = Splitter { leaf: leaf.max(1) };
+    let split = || {
+        let mut items: Vec<Item> = bounds
+            .iter()
+            .zip(0..count)
+            .map(|(b, primitive)| Item {
+                bounds: unbounded_where_nan(*b),
+                centre: centre(*b),
+                primitive,
+            })
+            .collect();
+        let mut sets = Vec::new();
+        splitter.split(&mut items, 0, 0, &mut sets);
+        (items, sets)
     };
-    let root = splitter.split(&mut items, 0, 0);
+    let (items, sets) = if bounds.len() < LARGE {
+        split()
+    } else {
+        inside(0, split)
+    };
     let mut tree = Bvh {
         nodes: Vec::new(),
         order: Vec::with_capacity(items.len()),
         leaves: vec![0],
-        bounds: splitter.sets[root as usize].bounds,
+        bounds: sets[0].bounds,
     };
-    flatten(&splitter.sets, &items, root, &mut tree);
+    flatten(&sets, &items, 0, &mut tree);
     Some(tree)
 }
 
@@ -93,29 +103,41 @@ fn centre(b: Bounds) -> [f64; 3] {
 
 struct Splitter {
     leaf: usize,
-    sets: Vec<Set>,
 }
 
 impl Splitter {
-    /// Orders the items so that every leaf is a range, and returns the set's number.
-    fn split(&mut self, items: &mut [Item], first: u32, depth: usize) -> u32 {
+    /// Orders the items so that every leaf is a range, appends their set and all below it, and returns the set's number.
+    fn split(&self, items: &mut [Item], first: u32, depth: usize, sets: &mut Vec<Set>) -> u32 {
         let bounds = items.iter().fold(Bounds::EMPTY, |b, item| b.union(item.bounds));
         #[allow(
             clippy::cast_possible_truncation,
             reason = "fewer than 2³¹ items and twice as many sets"
         )]
-        let (number, count) = (self.sets.len() as u32, items.len() as u32);
-        self.sets.push(Set {
+        let (number, count) = (sets.len() as u32, items.len() as u32);
+        sets.push(Set {
             bounds,
             kind: Kind::Leaf { first, count },
         });
         if items.len() > self.leaf {
+            let is_large = items.len() >= LARGE;
             let middle = self.partition(items, depth);
             let (left, right) = items.split_at_mut(middle);
             #[allow(clippy::cast_possible_truncation, reason = "below the number of items")]
             let second = first + middle as u32;
-            let children = [self.split(left, first, depth + 1), self.split(right, second, depth + 1)];
-            self.sets[number as usize].kind = Kind::Split(children);
+            let children = if is_large {
+                let (mut lower, mut upper) = (Vec::new(), Vec::new());
+                rayon::join(
+                    || self.split(left, first, depth + 1, &mut lower),
+                    || self.split(right, second, depth + 1, &mut upper),
+                );
+                [append(sets, lower), append(sets, upper)]
+            } else {
+                [
+                    self.split(left, first, depth + 1, sets),
+                    self.split(right, second, depth + 1, sets),
+                ]
+            };
+            sets[number as usize].kind = Kind::Split(children);
         }
         number
     }
@@ -197,6 +219,23 @@ impl Splitter {
         }
         best.map(|(_, plane)| plane)
     }
+}
+
+/// Appends sets that were numbered by themselves; returns the number of the first.
+fn append(sets: &mut Vec<Set>, others: Vec<Set>) -> u32 {
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "at most twice as many sets as there are items"
+    )]
+    let first = sets.len() as u32;
+    sets.extend(others.into_iter().map(|set| Set {
+        kind: match set.kind {
+            Kind::Split(children) => Kind::Split(children.map(|child| child + first)),
+            Kind::Leaf { .. } => set.kind,
+        },
+        ..set
+    }));
+    first
 }
 
 /// A boundary behind bin `last` along an axis.

@@ -194,3 +194,23 @@ fn boxes_without_a_bound_are_never_culled() {
     assert!(visited(&tree, Vec3::default(), Vec3::new(0.0, 0.0, 1.0), 0.0, f64::NAN).is_empty());
     assert!(visited(&tree, Vec3::default(), Vec3::new(0.0, 0.0, 1.0), 0.0, -1.0).is_empty());
 }
+
+#[test]
+fn a_tree_whose_sides_are_split_at_once_has_every_box() {
+    let boxes = random_boxes(40_000, 5.0);
+    let tree = Bvh::new(&boxes, 2).expect("few");
+    let mut order: Vec<u32> = tree.leaves().flatten().copied().collect();
+    order.sort_unstable();
+    assert!(order.iter().copied().eq(0..40_000));
+    let stream = Stream::new(9, 1);
+    for i in 0..4000 {
+        let [pick, a, b, c] = stream.uniforms(i, 0);
+        let pick = (pick * 40_000.0) as usize;
+        let Bounds { lo, hi } = boxes[pick];
+        let at = |lo: f64, hi: f64, u: f64| lo + u * (hi - lo);
+        let p = Vec3::new(at(lo.x, hi.x, a), at(lo.y, hi.y, b), at(lo.z, hi.z, c));
+        let d = whole(stream, i, 1, 1000.0).normalized();
+        let seen = visited(&tree, p - d * 50.0, d, 0.0, 1e9);
+        assert!(seen.contains(&(pick as u32)), "{i}");
+    }
+}
