@@ -141,6 +141,9 @@ def test_lobes_of_a_round_and_an_elliptical_gaussian() -> None:
 @pytest.mark.parametrize(
     ("asked", "told"),
     [
+        (lambda b: b.reflectance([30, 95, 100]), "theta is 95°; give angles"),
+        (lambda b: b.transmittance(-1), "theta is -1°"),
+        (lambda b: b.reflectance(30, wavelength=0.555), "wavelength is 0.555; give a finite number of nm, 10 at least"),
         (lambda b: b.reflectance(30, phi=math.nan), "phi is nan; give finite"),
         (lambda b: b.transmittance(30, phi=[0, math.inf]), "phi is"),
         (lambda b: b.reflectance(30, media=(1, -1.5)), "media is .* above 0"),

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from etendue import _core
 from etendue.description.files import Files
+from etendue.description.values import SHORTEST_WAVELENGTH
 from etendue.errors import ArgumentError
 from etendue.quantities.arguments import as_numbers, as_whole, require_known, require_number
 from etendue.quantities.bsdf_directions import direction
@@ -303,8 +304,9 @@ class Bsdf(abc.ABC):
     ) -> tuple[Array, Array, Array, Array]:
         side = _known(side)
         angles, azimuths = as_numbers(theta, "theta", "angles in °"), as_numbers(phi, "phi", "azimuths in °")
-        if not ((angles >= 0.0) & (angles <= 90.0)).all():
-            raise ArgumentError("angles of incidence are from 0 to 90°")
+        within = (angles >= 0.0) & (angles <= 90.0)
+        if not within.all():
+            raise ArgumentError(f"theta is {angles[~within][0]:g}°; give angles of incidence from 0 to 90°.")
         if not np.isfinite(azimuths).all():
             raise ArgumentError(f"phi is {phi!r}; give finite azimuths [°].")
         incident = direction(angles, azimuths, behind=side == "back")
@@ -379,9 +381,10 @@ class Bsdf(abc.ABC):
 
 def _surroundings(wavelength: float, media: tuple[float, float]) -> tuple[float, float, float]:
     """As the core takes them."""
-    require_number(wavelength, "wavelength", "a finite number of nm above 0")
-    if not (math.isfinite(wavelength) and wavelength > 0.0):
-        raise ArgumentError(f"wavelength is {wavelength!r}; give a finite number of nm above 0.")
+    asked = f"a finite number of nm, {SHORTEST_WAVELENGTH:g} at least"
+    require_number(wavelength, "wavelength", asked)
+    if not (math.isfinite(wavelength) and wavelength >= SHORTEST_WAVELENGTH):
+        raise ArgumentError(f"wavelength is {wavelength!r}; give {asked}.")
     wanted = "two refractive indices, finite and above 0: in front and behind"
     indices = as_numbers(media, "media", wanted)
     if indices.shape != (2,) or not (np.isfinite(indices) & (indices > 0.0)).all():
