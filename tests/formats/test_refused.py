@@ -7,6 +7,7 @@ from pathlib import Path
 import etendue as et
 import pytest
 from etendue.errors import FormatError, UnsupportedFormatError
+from etendue.formats.bsdf import fred, speos, speos_brdf, speos_coated, speos_scattering, speos_simple, tracepro_writing
 from etendue.formats.head import Head
 from etendue.formats.rays import read_rays, write_rays
 from etendue.formats.rays.refused import REFUSALS, refuse
@@ -28,6 +29,10 @@ NAMED = [
     ("lamp.fcr", "FRED", "TM-25"),
     ("lamp.crs", "critical ray set", "TM-25"),
     ("lamp.ldt", "EULUMDAT", "ray files"),
+    *(
+        (f"paint{end}", "BSDF", "etendue bsdf info")
+        for end in (".bsdf", ".astm", ".ssdd", ".brdf", ".coated", ".SCATTERING")
+    ),
 ]
 SIGNED = [
     (b"PK\x03\x04", "ZIP", "Unpack"),
@@ -42,6 +47,8 @@ SIGNED = [
     (b"OPTIS - Extended Map file", "Speos result map", "Export the rays"),
     (b"OPTIS - Spectrum file v1.0\n", "spectrum", "another file"),
     (b"\xd2\x07\x00\x00\x01\x00\x00\x00", "ZRD", "TM-25"),
+    *((text.START.encode(), "BSDF", "etendue bsdf info") for text in (fred, speos, speos_brdf, tracepro_writing)),
+    *((text.START, "BSDF", "etendue bsdf info") for text in (speos_coated, speos_scattering, speos_simple)),
 ]
 
 

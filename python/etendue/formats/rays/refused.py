@@ -90,6 +90,20 @@ REFUSALS = (
         extensions=(".spectrum", ".spcd", ".sre"),
     ),
     Refusal(
+        "scatter data of a surface (BSDF)",
+        "etendue bsdf info says what it holds; in a scene it is the file of a finish.",
+        signatures=(
+            b"OPTIS - Anisotropic BSDF",
+            b"OPTIS - brdf surface",
+            b"OPTIS - Coated surface",
+            b"OPTIS - Scattering surface",
+            b"OPTIS - Simple scattering surface",
+            b"TracePro Surface Property",
+            b"type bsdf_data",
+        ),
+        extensions=(".anisotropicbsdf", ".astm", ".brdf", ".bsdf", ".coated", ".scattering", ".simplescattering", ".ssdd"),
+    ),
+    Refusal(
         "a Zemax ray database (ZRD)",
         "It records whole paths and changes from version to version. Export a source file from OpticStudio: binary .sdf, "
         "or TM-25.",
