@@ -42,6 +42,7 @@ __all__ = [
     "losses",
     "mesh_facets",
     "mesh_shells",
+    "most_solids",
     "node_values",
     "open_edges",
     "polya_average",
@@ -603,6 +604,9 @@ def look_at_events(
 
     `brought` is the flux of the ray of each, its copies included.
     """
+
+def most_solids() -> int:
+    """Solids that a scene has at most."""
 
 def deepest() -> int:
     """How often scatter events are thinned at most."""

@@ -10,7 +10,9 @@ from typing import Any
 
 import etendue as et
 import pytest
+from etendue import _core
 from etendue.errors import ArgumentError, SceneError
+from etendue.scatter.models import Gaussian, Mixture
 from etendue.scene import Scene, compile_scene
 from etendue.scene.toml import to_toml
 from hypothesis import given
@@ -399,3 +401,22 @@ def test_a_wrong_value_in_a_row_is_one_mistake() -> None:
         Scene(sources=[point | {"spectrum": []}])
     with pytest.raises(SceneError, match="vertices: has 2 values; it must have 3 at least"):
         Scene(surfaces=[{"shape": {"kind": "polygon", "vertices": [[0, 0], [1, 0]]}, "finish": "mirror"}])
+
+
+def test_what_was_not_stated_is_not_stated_after_a_change() -> None:
+    """Folders of patches refuse pixels, and mixtures axes of parts, that are stated; a wavelength that is taken is told."""
+    source = Scene(sources=[{"kind": "gridded", "file": "patches"}]).sources[0].replace(flux=3)
+    assert source.model_fields_set == {"kind", "file", "flux"}
+    assert source == type(source)(file="patches", flux=3)
+    part = Gaussian(peak=0.5, sigma=0.2).replace(peak=0.4)
+    assert Mixture(parts=[part]).parts == (Gaussian(peak=0.4, sigma=0.2),)
+    lamp = {"kind": "point", "flux": 1, "flux_unit": "W"}
+    notes = compile_scene(Scene(sources=[lamp]).replace(name="again")).notes
+    assert ["555 nm is taken" in note for note in notes] == [True]
+
+
+def test_more_solids_than_a_scene_may_have_are_one_mistake() -> None:
+    (ball,) = Scene(solids=[{"shape": {"kind": "ball", "radius": 1.0}, "medium": "BK7"}]).solids
+    many = Scene(solids=[ball] * (_core.most_solids() + 1))
+    with pytest.raises(SceneError, match=r"solids: there are 65,535 of them, and 65,534 are the most; join those of one"):
+        compile_scene(many)

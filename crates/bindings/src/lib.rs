@@ -87,6 +87,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(trace::look_at_scene, module)?)?;
     module.add_function(wrap_pyfunction!(trace::look_at_events, module)?)?;
     module.add_function(wrap_pyfunction!(trace::deepest, module)?)?;
+    module.add_function(wrap_pyfunction!(trace::most_solids, module)?)?;
     module.add_function(wrap_pyfunction!(trace::trace_trails, module)?)?;
     module.add_function(wrap_pyfunction!(trace::scene_crossings, module)?)?;
     Ok(())

@@ -135,6 +135,12 @@ fn open<'py>(py: Python<'py>, scene: &Scene) -> PyResult<Vec<Opened<'py>>> {
     scene.sets().iter().map(|s| Opened::new(s.bind(py))).collect()
 }
 
+/// Solids that a scene has at most.
+#[pyfunction]
+pub fn most_solids() -> usize {
+    etendue_trace::scene::MOST_SOLIDS
+}
+
 /// Traces batches `first..last` of a run of `rays` rays: a work unit. Batches have `batch_size()` rays, or `each`.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "Python hands them over by name")]

@@ -34,6 +34,9 @@ pub struct Role {
     pub act: Act,
 }
 
+/// Solids of a scene: their numbers from 1 have sixteen bits in a [`SolidStack`](crate::solid_stack::SolidStack).
+pub const MOST_SOLIDS: usize = u16::MAX as usize - 1;
+
 /// A scene, complete and unchanging.
 #[derive(Clone, Debug)]
 pub struct Scene {
@@ -113,8 +116,8 @@ impl Scene {
         if media.is_empty() {
             return Err("a scene needs at least the medium of its surroundings".into());
         }
-        if solids.len() >= usize::from(u16::MAX) {
-            return Err(format!("{} solids; a scene has 65 534 at most", solids.len()));
+        if solids.len() > MOST_SOLIDS {
+            return Err(format!("{} solids; a scene has {MOST_SOLIDS} at most", solids.len()));
         }
         if let Some(medium) = solids.iter().find(|m| **m as usize >= media.len()) {
             return Err(format!("a solid of medium {medium}; there are {}", media.len()));

@@ -20,7 +20,7 @@ from etendue.quantities.fingerprint import fingerprint
 from etendue.quantities.spectrum import photopic_efficiency
 from etendue.scatter.members import same_when_turned
 from etendue.scene.bodies.body import Body
-from etendue.scene.colour_dependence import telling_finishes, telling_media, told_beyond
+from etendue.scene.colour_dependence import VISIBLE, telling_absorption, telling_finishes, telling_media, told_beyond
 from etendue.scene.face_rows import BodyFaces, FaceGathering, FaceRows
 from etendue.scene.finishes import BUILT_IN, Finish, Interface
 from etendue.scene.media import Medium
@@ -138,6 +138,7 @@ class _Compiler:
         self.sets: list[Any] = []
         self.used: list[npt.NDArray[np.float64]] = []
         self.means: dict[str, npt.NDArray[np.float64]] = {}
+        self.colourless: list[str] = []
         self.bodies: dict[Body, BodyFaces] = {}
         self.dressed: dict[tuple[object, ...], _Dressed] = {}
         self.named_finishes: dict[str, tuple[int, bool, Axis]] = {}
@@ -146,6 +147,13 @@ class _Compiler:
 
     def compiled(self) -> Compiled:
         """Everything, or all mistakes."""
+        count, most = len(self.scene.solids), _core.most_solids()
+        if count > most:
+            text = (
+                f"there are {count:,} of them, and {most:,} are the most; join those of one medium and finish that do not touch "
+                "to the shells of one mesh, which may be any number"
+            )
+            raise SceneError(self.scene.called, [("solids", text)])
         unit = self._sources()
         self._medium("surroundings", "surroundings", self.scene.surroundings)
         for i, solid in enumerate(self.scene.solids):
@@ -281,6 +289,15 @@ class _Compiler:
         if self.mistakes:
             return
         self.notes += told_beyond(self.rows, self.names)
+        things = [*telling_absorption(self.rows["media"], self.names["media"], VISIBLE),
+                  *telling_finishes(self.rows["finishes"], self.names["finishes"], VISIBLE)]  # fmt: skip
+        if things and "wavelength" not in self.scene.model_fields_set:
+            self.notes += [
+                f"{name}: the colours of its light are not known, and {', '.join(things)} "
+                f"treat{'s' if len(things) == 1 else ''} wavelengths differently; {self.scene.wavelength:g} nm is taken: "
+                "state its 'spectrum' or 'wavelength', or the scene's 'wavelength'"
+                for name in self.colourless
+            ]
         for name, wavelengths in self.means.items():
             things = [*telling_media(self.rows["media"], self.names["media"], wavelengths),
                       *telling_finishes(self.rows["finishes"], self.names["finishes"], wavelengths)]  # fmt: skip
@@ -411,6 +428,8 @@ class _Compiler:
                     self.notes += [f"{name}: {note}" for note in (*emitter.flux_notes, *emitter.notes)]
                     if emitter.mean:
                         self.means[name] = wavelengths
+                    if emitter.spectrum is None and not source.states_colours:
+                        self.colourless.append(name)
                     if emitter.flux_unit == "lm":
                         self.notes += _no_lumens(name, wavelengths[shares > 0.0])
                     elif emitter.spectrum is None and not source.states_colours:
