@@ -150,8 +150,8 @@ class _Compiler:
         count, most = len(self.scene.solids), _core.most_solids()
         if count > most:
             text = (
-                f"there are {count:,} of them, and {most:,} are the most; join those of one medium and finish that do not touch "
-                "to the shells of one mesh, which may be any number"
+                f"there are {count:,} of them, and {most:,} are the most; join those of one medium and finish that do not "
+                "touch to the shells of one mesh, which may be any number"
             )
             raise SceneError(self.scene.called, [("solids", text)])
         unit = self._sources()
