@@ -14,7 +14,7 @@ from etendue.errors import ArgumentError
 from etendue.formats.output import atomic_output
 from etendue.instruments.courses import after, checked_replicates, course_of, rule_of
 from etendue.instruments.goniometer_scan import GoniometerScan, full_width, summit, total_scatter
-from etendue.instruments.operators import Operator, OperatorName, folded, middle_of, operator_of, sparse_if_large
+from etendue.instruments.operators import DARK, Operator, OperatorName, folded, middle_of, operator_of, sparse_if_large
 from etendue.instruments.penalised_lobe import PenalisedLobe, penalised_lobe
 from etendue.instruments.shared_rays import together
 from etendue.quantities.arguments import require, require_known, require_number
@@ -235,6 +235,7 @@ def deconvolve(
     if spread is not None and gain is not None and middle is None:
         spread = np.hypot(spread, _error_of_middle(model, found.lobe, full, gain))
     image = model.matrix @ found.lobe
+    notes += _of_ends(model, image, method)
     values, error, raw, fitted, totals = _as_bsdf(scan, full, model, found.lobe, spread, image)
     if operator == "rings":
         notes += _of_one_plane(scan, signature, values)
@@ -305,6 +306,30 @@ def _of_one_plane(scan: GoniometerScan, signature: GoniometerScan, values: Array
     return [f"{said}; of one that is {surfaces}, the peak found is about {part:.2f} of the true one"]
 
 
+def _ends(image: Array) -> tuple[float, float]:
+    """Fitted flux at the first and the last position over the largest."""
+    largest = max(float(image.max()), np.finfo(np.float64).tiny)
+    return float(image[0]) / largest, float(image[-1]) / largest
+
+
+def _of_ends(model: Operator, image: Array, method: Method) -> list[str]:
+    """What is to be said of a scan that ends on the lobe."""
+    ends = [
+        f"at {share:.2g} of its largest flux, {abs(float(at)):.3g}° from the middle"
+        for share, at in zip(_ends(image), (model.angle[0], model.angle[-1]), strict=True)
+        if share > DARK
+    ]
+    if not ends:
+        return []
+    beyond = f"the scan ends on the lobe, {' and '.join(ends)}: the total scatter is what lies between its ends, and"
+    within = f"values within {model.reach:.3g}° of an end"
+    if model.name == "slice":
+        return [f"{beyond} {within} are too high or too low, as the slice takes all beyond for dark"]
+    if method == "penalised":
+        return [f"{beyond} {within} rest on a lobe that goes on as smoothly as it came"]
+    return [f"{beyond} {within} rest on light beyond that nothing measured, and are off by more than they state"]
+
+
 def _without_gaps(scan: GoniometerScan) -> GoniometerScan:
     """With positions in even steps, linear between those there are: a convolution needs them."""
     count = round(float(np.ptp(scan.angle)) / scan.step)
@@ -338,12 +363,19 @@ def _misfit(lobe: PenalisedLobe) -> tuple[str, ...]:
 
 
 def _error_of_middle(model: Operator, found: Array, scan: GoniometerScan, gain: float) -> Array:
-    """What the values owe to the middle, which was found with an error of its own, by Fisher's information of a shift."""
+    """What the values owe to the middle: where both sides differ least in the mean square, with the noise of each.
+
+    Of a scan that ends on the lobe the last pair is not looked at, and one side may tell most: what it says of the other is
+    off by twice as much as the middle.
+    """
     image = model.matrix @ found + scan.background
-    slope = np.gradient(image, model.angle)
-    known = float(np.sum(slope**2 / np.maximum(image, 1e-9 * image.max())))
-    shift = np.sqrt(gain / known) if known > 0.0 else 0.0
-    return np.asarray(np.abs(np.gradient(model.at_positions(found), model.angle)) * shift)
+    cut = max(_ends(image)) > DARK
+    # Only positions with a counterpart on the other side tell of it.
+    paired = np.abs(model.angle) <= min(-model.angle[0], model.angle[-1]) - (scan.step if cut else 0.0)
+    squares = np.where(paired, np.gradient(image, model.angle) ** 2, 0.0)
+    known = float(squares.sum())
+    shift = np.sqrt(gain * float(squares @ np.maximum(image, 0.0))) / known if known > 0.0 else 0.0
+    return np.asarray(np.abs(np.gradient(model.at_positions(found), model.angle)) * shift * (2.0 if cut else 1.0))
 
 
 class _Task(NamedTuple):
@@ -439,6 +471,8 @@ def _as_bsdf(
     turned = scan.angle - (scan.angle - back(model.angle))
     before = total_scatter(turned, scan.flux / per)
     after = total_scatter(turned, at)
-    scale = before / after if after > 0.0 and before > 0.0 else 1.0
+    # What blur takes across an end is not known: of a scan that ends on the lobe the total of the fitted flux is kept.
+    kept = total_scatter(turned, back(image) / per) if max(_ends(image)) > DARK else after
+    scale = before / kept if kept > 0.0 and before > 0.0 else 1.0
     error = None if spread is None else back(spread) / per * scale / cosine
     return at * scale / cosine, error, scan.flux / per / cosine, back(image), (before, after * scale)

@@ -19,6 +19,12 @@ OperatorName = Literal["rings", "slice"]
 FAINT = 1e-4
 """Of the largest value of an instrument function: below, it is noise."""
 
+DARK = 1e-3
+"""Of the largest value of a scan: one that has more at an end ends on the lobe."""
+
+FEWEST_PAIRS = 2
+"""Positions on either side of a middle that have a counterpart."""
+
 FINE = 16
 """Parts of a step between positions of an instrument function."""
 
@@ -94,21 +100,56 @@ def _cubic(u: Array) -> tuple[Array, Array, Array, Array]:
 def middle_of(angle: Array, values: Array) -> float:
     """The angle about which values are most nearly symmetrical [°]: where they agree best with themselves, mirrored.
 
+    Where they end on the lobe, what has no counterpart is left out, and the middle lies within half a width of the largest.
+
     Examples
     --------
     >>> angle = np.arange(-5.0, 5.01, 0.1)
     >>> round(middle_of(angle, np.exp(-0.5 * (angle - 0.234) ** 2)), 3)
     0.234
+    >>> part = np.arange(-5.0, 1.01, 0.1)
+    >>> round(middle_of(part, np.exp(-0.5 * (part - 0.234) ** 2)), 3)
+    0.234
     """
     step = float(np.diff(angle).min())
     even = np.arange(angle[0], angle[-1] + 0.5 * step, step)
     y = np.interp(even, angle, values)
+    if max(y[0], y[-1]) > DARK * y.max():
+        return _middle_of_part(even, y)
     size = 1 << (2 * y.size - 1).bit_length()
     both = np.fft.irfft(np.fft.rfft(y, size) ** 2, size)[: 2 * y.size - 1]
     k = int(np.clip(np.argmax(both), 1, both.size - 2))
     a, b, c = both[k - 1 : k + 2]
     off = 0.5 * (a - c) / (a - 2.0 * b + c) if a - 2.0 * b + c < 0.0 else 0.0
     return float(even[0] + 0.5 * (k + off) * step)
+
+
+def _middle_of_part(angle: Array, values: Array) -> float:
+    """Where values at even steps differ least, in the mean square, from those that they have a counterpart with."""
+    top = int(np.argmax(values))
+    bright = values > 0.5 * values[top]
+    dim = np.flatnonzero(~bright)
+    below, above = dim[dim < top], dim[dim > top]
+    reach = min(top - int(below[-1]) if below.size else values.size, int(above[0]) - top if above.size else values.size)
+    least = min(FEWEST_PAIRS, (values.size - 1) // 2)
+    # In half steps: between two positions there are pairs as well.
+    trial = np.arange(max(2 * (top - reach), 2 * least), min(2 * (top + reach), 2 * (values.size - 1 - least)) + 1)
+    if not trial.size:
+        return float(angle[top])
+    best = int(trial[np.argmin([_unlikeness(values, twice) for twice in trial.tolist()])])
+    # A parabola through its neighbours with the same pairs, as many for each.
+    count = min(best - 2, 2 * (values.size - 1) - best - 2) // 2 + 1
+    a, b, c = (_unlikeness(values, best + 2 * step, count) for step in (-1, 0, 1))
+    bend = a - 2.0 * b + c
+    between = float(np.clip(0.5 * (a - c) / bend, -0.5, 0.5)) if bend > 0.0 else 0.0
+    return float(angle[0] + (0.5 * best + between) * (angle[1] - angle[0]))
+
+
+def _unlikeness(values: Array, twice: int, most: int | None = None) -> float:
+    """Mean square of what values differ by from their counterparts about `twice`/2; of the `most` innermost pairs."""
+    count = min(twice, 2 * (values.size - 1) - twice) // 2 + 1
+    inner = np.arange(min(count, most or count))
+    return float(np.mean((values[twice // 2 - inner] - values[(twice + 1) // 2 + inner]) ** 2))
 
 
 def folded(signature: GoniometerScan) -> tuple[Array, Array]:
@@ -192,7 +233,8 @@ def operator_of(scan: GoniometerScan, signature: GoniometerScan, name: OperatorN
             name, matrix * step / np.trapezoid(np.append(blur[:0:-1], blur), dx=radius[1]), angle, angle, reach
         )
     step = scan.step
-    nodes = np.arange(0.0, np.abs(angle).max() + step, step)
+    # The last positions see what lies beyond them, as far as the blur reaches.
+    nodes = np.arange(0.0, np.abs(angle).max() + reach + step, step)
     return Operator(name, _rings(np.abs(angle), nodes, radius, blur), nodes, angle, reach)
 
 
@@ -228,7 +270,7 @@ def _rings(angle: Array, nodes: Array, radius: Array, blur: Array) -> Array:
     for shift, part in zip((-1, 0, 1, 2), _cubic(u), strict=True):
         spline = np.minimum(np.abs(column + shift), matrix.shape[1] - 1)
         np.add.at(matrix, (np.broadcast_to(rows, spline.shape), spline), around @ part)
-    # Rings beyond the scan are not known: what they would give is left to the last one.
+    # The last spline stands for those that no blur reaches in full.
     inside = matrix[:, : nodes.size]
     inside[:, -1] += matrix[:, nodes.size :].sum(axis=1)
     return np.asarray((inside / total)[own])

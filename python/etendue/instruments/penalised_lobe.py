@@ -16,6 +16,9 @@ Array = npt.NDArray[np.float64]
 LEAST_START = 1e-4
 """Of the largest value: what the search begins with where the scan shows nothing."""
 
+START_PENALTY = 1e-4
+"""Of the third derivatives of what the search begins with."""
+
 LEAST, LARGEST = 1e-8, 1e2
 """Of the weights of the penalty, angles in reaches: next to none, and a lobe whose logarithm is a parabola."""
 
@@ -110,7 +113,9 @@ def penalised_lobe(model: Operator, measured: Array, background: float, gain: fl
     fit = _Fit(model, np.maximum(measured, 0.0) / gain, background / gain, gain)
     start = model.start(np.maximum(measured - background, 0.0))
     wanted = np.log(np.maximum(start, LEAST_START * start.max()))
-    unknowns = np.linalg.lstsq(fit.dense, wanted, rcond=None)[0]
+    # The last spline may hardly reach the last node, which then says nothing of it.
+    rows = np.vstack([fit.dense, START_PENALTY * fit.thirds])
+    unknowns = np.linalg.lstsq(rows, np.append(wanted, np.zeros(len(fit.thirds))), rcond=None)[0]
     hats = _hats(fit.middles, model.reach)
     weights = np.full(len(hats), np.sqrt(LEAST * LARGEST))
     for i in range(MOST_ROUNDS):
