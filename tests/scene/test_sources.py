@@ -398,3 +398,28 @@ def test_detectors_in_place() -> None:
     assert second["frame"][9:] == [0, 0, -1]
     assert (second["columns"], second["rows"]) == (8, 3)
     assert third == {"kind": "intensity", "c_planes": 24, "gamma_step": 10}
+
+
+@pytest.mark.parametrize("unit", ["lm", "W"])
+def test_light_of_unknown_colours_beside_a_filter_is_told(unit: str) -> None:
+    """A thing that is selective, and a colour that is taken: told if nobody stated it, however the scene was made."""
+    dye = {"index": 1.33, "absorption": {"wavelength": [400, 700], "values": [0.2, 0.0]}}
+    sheet = {"shape": {"kind": "disk", "radius": 1}, "at": [0, 0, 1], "finish": "cyan"}
+    scene = et.Scene(
+        finishes={"cyan": {"kind": "transmitter", "transmittance": {"wavelength": [400, 700], "values": [0.9, 0.1]}}},
+        sources=[{"name": "lamp", "kind": "point", "flux": 1, "flux_unit": unit}],
+        solids=[{"name": "cell", "shape": {"kind": "ball", "radius": 1}, "at": [0, 0, 5], "medium": dye}],
+        surfaces=[sheet],
+    )
+    told = "the colours of its light are not known, and the absorption of 'cell.medium', the finish 'cyan' treat wavelengths"
+
+    def tells(given: et.Scene) -> bool:
+        return any(note.startswith(f"lamp: {told} differently; 555 nm is taken") for note in compile_scene(given).notes)
+
+    assert tells(scene)
+    assert tells(scene.replace(name="again"))
+    assert not tells(scene.replace(surfaces=[{**sheet, "finish": "mirror"}]))
+    clear = [{"name": "cell", "shape": {"kind": "ball", "radius": 1}, "at": [0, 0, 5], "medium": "BK7"}]
+    assert not any("not known" in note for note in compile_scene(scene.replace(surfaces=[], solids=clear)).notes)
+    assert not tells(scene.replace(wavelength=555))
+    assert not tells(scene.replace(sources=[scene.sources[0].replace(wavelength=555)]))

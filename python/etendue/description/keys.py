@@ -76,14 +76,15 @@ class Description(BaseModel):
         return handler(data)
 
     def replace(self, **changes: Any) -> Self:
-        """The same with other values for some keys, checked again.
+        """The same with other values for some keys, checked again; what was not stated before is not stated after.
 
         Raises
         ------
         SceneError
             As the constructor.
         """
-        return type(self)(**{key: getattr(self, name) for key, name in self.names_by_key().items()} | changes)
+        keys = self.names_by_key().items()
+        return type(self)(**{key: getattr(self, name) for key, name in keys if name in self.model_fields_set} | changes)
 
     def __repr_args__(self) -> Iterator[tuple[str, Any]]:
         """Keys and values, as the constructor takes them."""

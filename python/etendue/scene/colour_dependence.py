@@ -17,6 +17,9 @@ Record = dict[str, Any]
 SAME = 1e-9
 """Values that differ by less, of a quantity of the order of 1, are taken for equal."""
 
+VISIBLE = np.arange(380.0, 781.0)
+"""Wavelengths [nm] at which things are compared where those of the light are not known."""
+
 TOLD_BEYOND = 1e-3
 """Share of the light of a source beyond the ends of a table from which on it is told."""
 
@@ -35,6 +38,21 @@ def telling_media(rows: Sequence[Record], names: Sequence[str], wavelength: Arra
     for row, name in zip(rows, names, strict=True):
         if _differs(index_of(row["index"], wavelength)):
             yield f"the index of {name!r}"
+        yield from telling_absorption([row], [name], wavelength)
+
+
+def telling_absorption(rows: Sequence[Record], names: Sequence[str], wavelength: Array) -> Iterator[str]:
+    """The same of absorption alone.
+
+    Examples
+    --------
+    >>> from etendue.description.files import Files
+    >>> from etendue.scene.media import Medium
+    >>> dye = Medium(index=1.33, absorption={"wavelength": [400, 700], "values": [0.2, 0.0]}).record(Files())
+    >>> list(telling_absorption([dye], ["dye"], np.array([450.0, 633.0])))
+    ["the absorption of 'dye'"]
+    """
+    for row, name in zip(rows, names, strict=True):
         absorption = row["absorption"]
         if _differs(np.interp(wavelength, absorption["wavelength"], absorption["per_mm"])):
             yield f"the absorption of {name!r}"
