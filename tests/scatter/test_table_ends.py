@@ -137,3 +137,25 @@ def test_what_is_extrapolated_is_told_and_has_no_error(monkeypatch: pytest.Monke
     assert found.extrapolated == {"gloss 85": 60.0}
     assert set(found.errors) == {"gloss 20", "gloss 60", "reflection haze", "distinctness"}
     assert appearance(et.bsdf.Lambertian(reflectance=0.5)).extrapolated == {}
+
+
+@pytest.mark.parametrize("theta", [80.0, 89.0])
+def test_rays_off_a_lobe_that_the_horizon_cuts_have_the_share_that_is_stated(theta: float) -> None:
+    """Most of the lobe would lie beyond the horizon. The count is binomial: within 4 of its standard errors."""
+    radial, azimuth, share = np.linspace(0.0, 2.0, 40), np.arange(0.0, 360.0, 30.0), 0.9
+    grid = PolarGrid("cosines", radial, azimuth)
+    width = 0.5 * (1.0 + 0.3 * np.cos(np.radians(azimuth)))[:, None]
+    shape, incident = np.exp(-0.5 * (radial / width) ** 2), direction(60.0, 0.0)
+    values = shape * share / BsdfSlice(incident, shape, grid=grid).integral()
+    table = et.BsdfTable(BsdfData([BsdfSlice(incident, values, grid=grid)]))
+    towards = direction(theta, 0.0)
+    beam = {"kind": "beam", "shape": {"kind": "disk", "radius": 1e-4}, "flux": 1, "at": 10 * towards, "toward": -towards}
+    scene = et.Scene(
+        sources=[beam],
+        surfaces=[{"shape": {"kind": "disk", "radius": 50}, "finish": {"kind": "bsdf", "bsdf": table}}],
+        detectors=[{"name": "all", "kind": "rays", "shape": {"kind": "hemisphere", "radius": 60}}],
+    )
+    rays = 20_000
+    flux, error = et.trace(scene, rays=rays, seed=1).flux_of("all")
+    assert error == pytest.approx(np.sqrt(flux * (1.0 - flux) / rays), rel=1e-3)
+    assert abs(flux - share) < 4.0 * error

@@ -59,7 +59,8 @@ impl Group {
                 found.give(&mut list[rays.clone()]);
             }
             self.waiting.take(&self.arrivals, &list[..count], first);
-            if self.waiting.are_enough() {
+            // Of a lobe that the horizon cuts most may go on waiting.
+            while self.waiting.are_enough() {
                 self.waiting.leave(lobe, up, directions);
             }
         }

@@ -349,6 +349,14 @@ impl crate::bsdf::examples::Examples for Tabulated {
         let both = side([Some(turned), Some(faint)]);
         let one = side([Some(isotropic), None]);
         let [even, odd] = [14, 9].map(|azimuths| side([Some(alike(azimuths)), None]));
+        // Of light that grazes, most of the lobe lies beyond the horizon.
+        let wide = Way {
+            rows: vec![Row {
+                azimuth: 0.0,
+                slices: vec![lobe(0.6, 0.3, 0.0, 0.9, 0.0), lobe(0.6, 0.3, 0.99, 0.9, 0.0)],
+            }],
+        };
+        let wide = side([Some(wide), None]);
         // Bases that fall towards the horizon, to 0 before it, and with a hole; the middle of steps is where a lattice looks.
         let [falling, ending, broken] = [
             &[1.0, 0.9, 0.7, 0.4, 0.1][..],
@@ -360,6 +368,7 @@ impl crate::bsdf::examples::Examples for Tabulated {
             ([&both, &one], [falling, &[]]),
             ([&coloured, &both], [ending, falling]),
             ([&even, &odd], [falling, broken]),
+            ([&wide, &one], [&[], &[]]),
         ]
         .map(|(sides, bases)| Self::new(sides, bases).expect("sound"))
         .to_vec()

@@ -107,6 +107,27 @@ fn many_rays_are_drawn_for_as_each_by_itself() {
 }
 
 #[test]
+fn many_grazing_rays_are_drawn_for_as_each_by_itself() {
+    // Most directions off a lobe that the horizon cuts are drawn again: more rays wait than are worked on together.
+    let (stream, n) = (Stream::new(43, 0), 2000_usize);
+    let numbers = [0, 1].map(|k| (0..n).map(|i| stream.uniforms(i as u64, 0)[k]).collect::<Vec<f64>>());
+    let numbers = numbers.each_ref().map(|list| &list[..]);
+    for Example { name, bsdf, .. } in kinds().iter().flatten() {
+        let incident: Vec<Vec3> = (0..n).map(|i| direction(0.02, 0.137 * i as f64)).collect();
+        let media = vec![MEDIA[0]; n];
+        let mut found = [0, 1, 2].map(|axis| incident.iter().map(|d| [d.x, d.y, d.z][axis]).collect::<Vec<f64>>());
+        let (mut expected, mut outcomes) = (found.clone(), vec![Outcome::Absorbed; n]);
+        bsdf.sample_many(&mut found, &media, numbers, &mut outcomes);
+        for (i, incident) in incident.into_iter().enumerate() {
+            let alone = bsdf.sample(incident, &media[i], numbers.map(|list| list[i]));
+            assert_eq!(outcomes[i], alone.keep(&mut expected, i), "{name}");
+            let [found, expected] = [&found, &expected].map(|lists| lists.each_ref().map(|list| list[i]));
+            assert!(found == expected || outcomes[i] == Outcome::Absorbed, "{name}");
+        }
+    }
+}
+
+#[test]
 fn a_density_that_is_wrong_is_seen() {
     // The test above, with a share of 3 % moved from one side of the normal to the other.
     let bsdf = Lambertian::examples().remove(0);
