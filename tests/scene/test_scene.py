@@ -418,5 +418,7 @@ def test_what_was_not_stated_is_not_stated_after_a_change() -> None:
 def test_more_solids_than_a_scene_may_have_are_one_mistake() -> None:
     (ball,) = Scene(solids=[{"shape": {"kind": "ball", "radius": 1.0}, "medium": "BK7"}]).solids
     many = Scene(solids=[ball] * (_core.most_solids() + 1))
-    with pytest.raises(SceneError, match=r"solids: there are 65,535 of them, and 65,534 are the most; join those of one"):
+    with pytest.raises(
+        SceneError, match=r"solids: there are 65,535 of them, and 65,534 are the most; join those of one"
+    ):
         compile_scene(many)
