@@ -47,8 +47,8 @@ def test_files_hold_the_flux_of_a_beam_and_its_peak(exponent: float, c: float, g
     assert read_back(far, tmp_path) == pytest.approx([flux, flux], rel=1e-3)
     peak = flux * (exponent + 1) / (2 * np.pi)
     assert abs(far.maximum - peak) < LARGEST_Z * far.maximum_error
-    # An error that says nothing is none: 10⁵ rays know the peak to a quarter at least.
-    assert far.maximum_error < 0.25 * peak
+    # An error that says nothing is none: 10⁵ rays know the peak to a third at least.
+    assert far.maximum_error < peak / 3.0
 
 
 @pytest.mark.slow

@@ -227,3 +227,37 @@ def test_the_largest_of_values_that_are_alike_is_not_the_peak() -> None:
         lifted.append((far.maximum - 1.0) / far.peak_error)
     assert min(lifted) > 0.5
     assert abs(np.mean(peaks)) < 0.5 * np.mean(lifted)
+
+
+FAINT = {
+    "Lambertian, tilted by 50°": ((1.0, 1.0, 137.0, 50.0),),
+    "cos⁴, tilted": ((1.0, 4.0, 200.0, 33.0),),
+    "3°, 20° off the axis": ((1.0, 730.0, 70.0, 20.0),),
+    "a beam in faint light": ((0.98, 730.0, 70.0, 20.0), (0.02, 1.0, 250.0, 30.0)),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [10_000, 100_000])
+@pytest.mark.parametrize("name", FAINT)
+def test_nodes_of_few_rays_and_beside_the_end_of_the_light_state_what_they_know(name: str, n: int) -> None:
+    """All nodes that have an error, those beside the horizon and those of one ray at the edge of a hat as well.
+
+    The mean square of deviations over errors is that of normal deviates or less, and hardly any lies beyond four errors.
+    """
+    parts = FAINT[name]
+    lobes = [(share, lobe(exponent=exponent, c=c, gamma=gamma)) for share, exponent, c, gamma in parts]
+    found = []
+    for seed in range(4):
+        far = et.intensity_distribution(rays_of(*(
+            (beam(round(share * n), exponent=exponent, c=c, gamma=gamma, seed=660_000 + 10 * seed + i), share)
+            for i, (share, exponent, c, gamma) in enumerate(parts)
+        )))  # fmt: skip
+        expected = sum(share * each(far.c[:, None], far.gamma[None, :]) for share, each in lobes)
+        z = (far.values - expected) / far.standard_error
+        z[1:, np.isin(far.gamma, (0.0, 180.0))] = np.nan
+        found.append(z[np.isfinite(z)])
+    z = np.concatenate(found)
+    many = effective(found)
+    assert (z**2).mean() < 1.0 + LARGEST_Z * np.sqrt(2.0 / many)
+    assert_drawn_with(share=(1e-9, 0.002), hits=many * float((np.abs(z) > 4.0).mean()), rays=many)

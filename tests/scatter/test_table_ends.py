@@ -149,7 +149,13 @@ def test_rays_off_a_lobe_that_the_horizon_cuts_have_the_share_that_is_stated(the
     values = shape * share / BsdfSlice(incident, shape, grid=grid).integral()
     table = et.BsdfTable(BsdfData([BsdfSlice(incident, values, grid=grid)]))
     towards = direction(theta, 0.0)
-    beam = {"kind": "beam", "shape": {"kind": "disk", "radius": 1e-4}, "flux": 1, "at": 10 * towards, "toward": -towards}
+    beam = {
+        "kind": "beam",
+        "shape": {"kind": "disk", "radius": 1e-4},
+        "flux": 1,
+        "at": 10 * towards,
+        "toward": -towards,
+    }
     scene = et.Scene(
         sources=[beam],
         surfaces=[{"shape": {"kind": "disk", "radius": 50}, "finish": {"kind": "bsdf", "bsdf": table}}],

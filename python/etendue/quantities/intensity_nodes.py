@@ -15,7 +15,9 @@ from etendue import _core
 from etendue.errors import ArgumentError
 from etendue.quantities.angle_table import gaps_of, hat_integrals
 from etendue.quantities.arguments import as_whole, require_number
+from etendue.quantities.few_rays import NodeSums, one_ray
 from etendue.quantities.intensity import Intensity
+from etendue.quantities.node_blur import blur_of, hidden_shapes, rising_rows
 from etendue.quantities.provenance import Provenance
 from etendue.units import FluxUnit
 
@@ -29,6 +31,10 @@ LIT = 0.02
 
 MANY = 10.0
 """Standard errors beyond which it is of no consequence how many."""
+
+UNTOLD = 0.5
+"""Standard errors of a node that what it blurs must be to be told from noise: two of those of a second difference over
+12."""
 
 NEIGHBOURS = 0.25
 """Correlation of the errors of neighbouring nodes: ∫φφ' over ∫φ² of two hats in even light."""
@@ -147,6 +153,7 @@ class Nodes:
         rows = [_around(np.array(c), v, e, planes) for c, v, e in pairs]
         value_rows, error_rows = (np.stack(arrays) for arrays in zip(*rows, strict=True))
         gamma, table = np.array(self.gamma), np.array(self.table)
+        error_rows = np.hypot(error_rows, hidden_shapes(gamma, self.c, planes, value_rows, error_rows))
         before = (np.searchsorted(gamma, table, side="right") - 1).clip(0, gamma.size - 2)
         width = gamma[before + 1] - gamma[before]
         up = ((table - gamma[before]) / width)[:, None]
@@ -159,34 +166,12 @@ class Nodes:
         )
         return between[0].T, between[1].T
 
-    def _blur(self, values: Array, chosen: bool) -> tuple[Array, npt.NDArray[np.bool_]]:
-        """What the means around nodes are off from the intensity at them, and whether it is dark beside a node.
-
-        Chosen steps hold the light but where it rises from a dark pole: they are chosen by the light of all rows together,
-        and hold those less well. Asked ones are off everywhere, around the axis as well, by h²/12 of the curvature there.
-        About a pole light is even in γ, as I₀ + bγ²: with steps h, the pole's node is off by 0.3 bh², and the row beside it
-        is 1.2 bh² above it.
-        """
-        rows = np.split(values, np.cumsum([len(row) for row in self.c])[:-1])
-        gamma = np.radians(self.gamma)
-        rises = np.diff([row.mean() for row in rows])
-        # Rows from each pole on, as long as each is brighter than the one before.
-        rising = np.logical_and.accumulate(np.append(rises > 0.0, False))
-        rising |= np.logical_and.accumulate(np.append(rises[::-1] < 0.0, False))[::-1]
-        off, dark = [], []
-        for i, (c, row) in enumerate(zip(map(np.array, self.c), rows, strict=True)):
-            if i in (0, len(rows) - 1):
-                beside = rows[1] if i == 0 else rows[-2]
-                along = (beside.mean() - row) / 4.0
-                dark.append(np.full(row.size, not beside.any()))
-            else:
-                below, above = (_on(c, self.c[j], rows[j]) for j in (i - 1, i + 1))
-                along = _hat_bias(below, row, above, gamma[i - 1 : i + 2])
-                dark.append((below == 0.0) | (above == 0.0) | (np.roll(row, 1) == 0.0) | (np.roll(row, -1) == 0.0))
-            # Along a row, of even steps, the second difference is the curvature times h².
-            around = 0.0 if chosen else (np.roll(row, 1) - 2.0 * row + np.roll(row, -1)) / 12.0
-            off.append(np.where(rising[i] | (not chosen), along + around, 0.0))
-        return np.concatenate(off), np.concatenate(dark)
+    def _noise(self, flux: Array, error: Array) -> Array:
+        """Standard errors of sums over rays, no less than those of as many equal rays, and one more; NaN stays."""
+        counts = np.array([len(row) for row in self.c])
+        row = np.repeat(np.arange(counts.size), counts)
+        single = one_ray(NodeSums(np.array(self.gamma), row, np.concatenate(self.c), flux, error))
+        return np.asarray(np.hypot(np.maximum(error, np.sqrt(single * flux)), single))
 
     def intensity(
         self,
@@ -202,16 +187,17 @@ class Nodes:
         off from the intensity at it. Of steps that were asked for, errors are those of the means; a note tells if the steps
         are so wide for the light that the intensity at the nodes is off from them by more.
         """
-        noise, level = error[:-1], flux[:-1] / self.solid_angle
+        noise, level = self._noise(flux[:-1], error[:-1]), flux[:-1] / self.solid_angle
+        blur = blur_of(self.gamma, self.c, level, np.nan_to_num(noise) / self.solid_angle)
         # Chosen steps are wider beside the poles (`etendue.quantities.node_choice`).
-        chosen = not np.allclose(np.diff(self.gamma), self.gamma[1] - self.gamma[0])
-        blur, dark = self._blur(level, chosen)
-        if not chosen:
-            notes = (*notes, *_told_of_blur(level, noise / self.solid_angle, blur))
+        if np.allclose(np.diff(self.gamma), self.gamma[1] - self.gamma[0]):
+            notes = (*notes, *_told_of_blur(level, noise / self.solid_angle, blur.off))
         else:
-            noise = np.hypot(noise, blur * self.solid_angle)
+            off, edge = blur.off * self.solid_angle, blur.edge * self.solid_angle
+            told = np.where(rising_rows(self.c, level), off**2, np.maximum(off**2 - (UNTOLD * noise) ** 2, 0.0))
+            noise = np.sqrt(noise**2 + told + edge**2)
             # Where it is dark beside a node, it may be dark there as well.
-            noise = np.where(dark & (level > 0.0), np.maximum(noise, flux[:-1]), noise)
+            noise = np.where(blur.dark & (level > 0.0), np.maximum(noise, flux[:-1]), noise)
         values, errors = self.tables(flux[:-1], noise)
         return Intensity(
             np.array(self.planes),
@@ -298,24 +284,6 @@ def planes_of(number: int) -> tuple[float, ...]:
     (0.0, 120.0, 240.0)
     """
     return tuple(np.linspace(0.0, 360.0, number, endpoint=False).tolist())
-
-
-def _on(c: Array, nodes: tuple[float, ...], values: Array) -> Array:
-    """The values of a row at other angles C."""
-    return np.asarray(np.interp(c, np.append(nodes, nodes[0] + 360.0), np.append(values, values[0])))
-
-
-def _hat_bias(before: Array, value: Array, after: Array, gamma: Array) -> Array:
-    """What the mean over the hat of the middle one of three rows γ [rad] is off from the value at it.
-
-    With slope I' and curvature I″ that is I' (m₁ + m₂ cot γ) + I″ m₂/2, since the mean is weighted by sin γ, with the hat's
-    moments m₁ = (b − a)/3 and m₂ = (a² − ab + b²)/6 for sides a and b.
-    """
-    low, high = np.diff(gamma)
-    rise, next_rise = (value - before) / low, (after - value) / high
-    slope, bend = (rise * high + next_rise * low) / (low + high), 2.0 * (next_rise - rise) / (low + high)
-    first, second = (high - low) / 3.0, (low**2 - low * high + high**2) / 6.0
-    return np.asarray(slope * (first + second / math.tan(gamma[1])) + bend * second / 2.0)
 
 
 def _around(c: Array, values: Array, error: Array, planes: Array) -> tuple[Array, Array]:

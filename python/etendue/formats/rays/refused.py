@@ -101,7 +101,16 @@ REFUSALS = (
             b"TracePro Surface Property",
             b"type bsdf_data",
         ),
-        extensions=(".anisotropicbsdf", ".astm", ".brdf", ".bsdf", ".coated", ".scattering", ".simplescattering", ".ssdd"),
+        extensions=(
+            ".anisotropicbsdf",
+            ".astm",
+            ".brdf",
+            ".bsdf",
+            ".coated",
+            ".scattering",
+            ".simplescattering",
+            ".ssdd",
+        ),
     ),
     Refusal(
         "a Zemax ray database (ZRD)",
