@@ -284,3 +284,44 @@ def test_no_flux_at_all() -> None:
 def test_cells_that_are_none(planes: int, step: float, message: str) -> None:
     with pytest.raises(ArgumentError, match=message):
         Nodes.even(planes, step)
+
+
+# --- colours -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["point", "surface"])
+def test_a_distribution_of_rays_shines_with_their_spectrum(kind: str) -> None:
+    """Behind a sheet that lets other shares of each line through: the hits of a line are binomial."""
+    lines, shares, let = np.array([450.0, 550.0, 633.0]), np.array([0.5, 0.3, 0.2]), np.array([0.1, 0.5, 0.9])
+    rng = np.random.default_rng(12)
+    down = direction(rng.uniform(0, 360, 3000), np.degrees(np.arcsin(0.9 * np.sqrt(rng.random(3000)))))
+    flux = np.repeat(shares * 2.0, 1000) / 1000.0
+    rays = et.RaySet(np.zeros((3000, 3)), down, flux, flux_unit="W", wavelength=np.repeat(lines, 1000))
+    led = intensity_distribution(rays)
+    found = led.luminaire["spectrum"]
+    assert found.wavelength.tolist() == lines.tolist()
+    assert found.lines("W")[1] == pytest.approx(shares, rel=1e-9)
+    shape = {"shape": {"kind": "disk", "radius": 1.0}} if kind == "surface" else {}
+    disk = {"kind": "disk", "radius": 5e3}
+    scene = et.Scene(
+        sources=[{"name": "led", "kind": kind, "intensity": led, **shape}],
+        finishes={"dye": {"kind": "transmitter", "transmittance": {"wavelength": lines, "values": let}}},
+        surfaces=[{"shape": disk, "at": [0, 0, 1], "finish": "dye"}],
+        detectors=[{"kind": "rays", "name": "out", "shape": disk, "at": [0, 0, 2]}],
+    )
+    n = 20_000
+    result = et.trace(scene, n)
+    seen = result.rays["out"]
+    total = result.ledger.total.flux
+    for line, share in zip(lines, shares * let, strict=True):
+        hits = n * float(seen.flux[seen.wavelength == line].sum()) / total
+        assert_drawn_with(share=float(share), hits=hits, rays=n)
+    assert any("the finish 'dye' treats its wavelengths differently" in note for note in result.notes)
+    assert not any("not known" in note for note in result.notes)
+
+
+def test_a_spectrum_that_all_rays_share_is_that_of_their_distribution() -> None:
+    white = et.Spectrum([420, 450, 480, 560, 700], [0.0, 1.0, 0.2, 0.7, 0.0])
+    plain = rays_of(direction([0.0, 90.0], [10.0, 50.0]), np.ones(2), "W")
+    assert "spectrum" not in intensity_distribution(plain).luminaire
+    assert intensity_distribution(plain.with_spectrum(white)).luminaire["spectrum"] == white

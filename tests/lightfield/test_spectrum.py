@@ -157,6 +157,11 @@ def test_drawn_rays_have_wavelengths_with_their_shares(field: LightField, tmp_pa
     assert white.sample(10).spectra == (WHITE,)
 
 
+def test_the_intensity_of_a_field_has_its_spectrum(field: LightField) -> None:
+    assert field.intensity(4, 30.0).luminaire["spectrum"] == field.spectrum
+    assert "spectrum" not in field.replace(spectrum=None).intensity(4, 30.0).luminaire
+
+
 def filtered(source: dict[str, Any], *, plate: bool, **keys: Any) -> et.Scene:
     """The disk behind a sheet that lets 0.1, 0.5 and 0.9 of the lines through."""
     sheet = {"wavelength": LINES, "values": [0.1, 0.5, 0.9]}

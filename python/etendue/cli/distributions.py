@@ -10,6 +10,7 @@ from etendue.quantities.data_sheet import data_sheet
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.luminaire_facts import LUMINAIRE_FACTS
 from etendue.quantities.measured import measured, peak_line
+from etendue.quantities.spectral_lines import SpectralLines
 from etendue.quantities.spectrum import Spectrum
 
 
@@ -47,7 +48,7 @@ def _stated(name: str, fact: Any) -> bool:
 
 
 def _plain(name: str, fact: Any) -> Any:
-    if isinstance(fact, Spectrum):
+    if isinstance(fact, Spectrum | SpectralLines):
         return {"wavelength": fact.wavelength.tolist(), "weight": fact.weight.tolist()}
     return fact if _stated(name, fact) else None
 
@@ -75,10 +76,9 @@ def print_intensity(distribution: Intensity) -> None:
     for line in data_sheet(distribution).lines():
         say(f"  {line}")
     for name, value in distribution.luminaire.items():
-        if isinstance(value, Spectrum):
-            say(
-                f"  spectrum: {value.wavelength[0]:g} to {value.wavelength[-1]:g} nm, {value.wavelength.size} wavelengths"
-            )
+        if isinstance(value, Spectrum | SpectralLines):
+            what = "lines" if isinstance(value, SpectralLines) else "wavelengths"
+            say(f"  spectrum: {value.wavelength[0]:g} to {value.wavelength[-1]:g} nm, {value.wavelength.size} {what}")
         elif name not in {"keywords", "lamp_sets", "tilt"}:
             text = _told(value)
             unit = re.search(r"\[(\w+)\]", LUMINAIRE_FACTS[name].replace("[flux unit]", f"[{distribution.flux_unit}]"))

@@ -54,6 +54,7 @@ def intensity_distribution(
         φ of the node in a ray of flux w; NaN for a node that no ray reached, whose intensity is 0. With chosen steps of γ,
         it is the value at least of a node beside such ones, where light ends, and where light rises from a dark pole it
         holds what the mean is off from the intensity at the node. `flux_error` is √(Σ w²).
+        ``luminaire["spectrum"]`` is that of all rays together, if they have one, whatever their directions.
         Copies of a ray, which have its place and direction, are one ray with the flux of all. The notes tell of them, and
         if the steps cannot hold a beam.
 
@@ -90,10 +91,12 @@ def intensity_distribution(
     asked = c_planes is not None and gamma_step is not None
     step = "far-field intensity, " + ("steps as asked" if asked else "steps chosen from the rays")
     result = nodes.intensity(sums, error, rays.flux_unit, rays.provenance.then(step))
+    spectrum = rays.total_spectrum()
     return result.replace(
         values=result.values * power,
         standard_error=result.standard_error * power,
         flux_error=result.flux_error * power,
+        luminaire={} if spectrum is None else {"spectrum": spectrum},
         notes=(*notes, *result.notes, *_notes(result), *rays.notes),
     )
 

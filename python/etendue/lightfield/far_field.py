@@ -85,7 +85,8 @@ def field_intensity(
     how = f"standard errors are those of counting the {counted} that the field rests on, node by node"
     # What is to be said of a beam without width is said of one that is as wide as a cell of the field.
     notes = (*(broadened or told), f"{nodes.describe()}; {how}: the field smooths, and is mostly better")
-    return result.replace(smooth=True, notes=(*notes, *result.notes, *field.notes))
+    luminaire = {} if field.spectrum is None else {"spectrum": field.spectrum}
+    return result.replace(smooth=True, luminaire=luminaire, notes=(*notes, *result.notes, *field.notes))
 
 
 def directions(nodes: Nodes) -> tuple[Array, Array]:

@@ -33,7 +33,7 @@ LUMINAIRE_FACTS: dict[str, str] = {
     "conversion_factor": "for intensities, of an EULUMDAT file, if it is not 1; not applied",
     "direct_ratios": "ten of an EULUMDAT file, if it has any",
     "tilt": "lamp factors over the tilt of the luminaire, of an IES file; not applied",
-    "spectrum": "`Spectrum` of all its light, if a file tells it",
+    "spectrum": "`Spectrum` or `SpectralLines` of all its light, if a file or the rays tell it",
     "keywords": "every keyword line of an IES file, as pairs",
 }
 """What may be known of the luminaire beside its intensity, with its meaning."""

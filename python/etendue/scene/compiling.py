@@ -303,7 +303,7 @@ class _Compiler:
                       *telling_finishes(self.rows["finishes"], self.names["finishes"], wavelengths)]  # fmt: skip
             if things:
                 self.notes.append(
-                    f"{name}: every place and direction of its light field has the spectrum of all its rays together, and "
+                    f"{name}: every place and direction of it has the spectrum of all its rays together, and "
                     f"{', '.join(things)} treat{'s' if len(things) == 1 else ''} its wavelengths differently; where colour "
                     "changes with place or direction, only the rays themselves, traced forwards, keep it"
                 )

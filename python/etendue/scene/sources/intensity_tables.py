@@ -11,6 +11,7 @@ from etendue.description.files import Files
 from etendue.errors import ArgumentError
 from etendue.formats.intensity import read_intensity
 from etendue.quantities.intensity import Intensity
+from etendue.quantities.spectral_lines import SpectralLines
 from etendue.units import FluxUnit
 
 
@@ -100,6 +101,20 @@ def table_record(table: Intensity) -> dict[str, Any]:
     [0.0, 1.5708]
     """
     return {"gamma": np.radians(table.gamma), "c": np.radians(table.c), "values": np.array(table.values)}
+
+
+def is_mean(table: Intensity) -> bool:
+    """Whether the spectrum of a distribution is that of rays of several colours, which may go into different directions.
+
+    Examples
+    --------
+    >>> from etendue.quantities.spectral_lines import SpectralLines
+    >>> rays = Intensity([0], [0, 180], [[1.0, 1]], luminaire={"spectrum": SpectralLines([450, 600], [1, 2])})
+    >>> is_mean(rays)
+    True
+    """
+    spectrum = table.luminaire.get("spectrum")
+    return isinstance(spectrum, SpectralLines) and spectrum.wavelength.size > 1
 
 
 def front_of(table: Intensity) -> Intensity:
