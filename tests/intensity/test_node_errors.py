@@ -261,3 +261,18 @@ def test_nodes_of_few_rays_and_beside_the_end_of_the_light_state_what_they_know(
     many = effective(found)
     assert (z**2).mean() < 1.0 + LARGEST_Z * np.sqrt(2.0 / many)
     assert_drawn_with(share=(1e-9, 0.002), hits=many * float((np.abs(z) > 4.0).mean()), rays=many)
+
+
+def test_an_edge_of_the_light_is_an_error_of_the_nodes_beside_it_alone() -> None:
+    """Even light up to 90°, Φ/2π: nodes whose hats end before it are off by their noise, and say so."""
+    rng = np.random.default_rng(31)
+    n = 30_000
+    far = et.intensity_distribution(
+        rays_of((direction(c=rng.uniform(0, 360, n), gamma=np.degrees(np.arccos(rng.random(n)))), 2.0 * np.pi))
+    )
+    before = far.standard_error[:, (far.gamma > 50.0) & (far.gamma < 75.5)]
+    beside = far.standard_error[:, (far.gamma > 82.0) & (far.gamma < 90.0)]
+    off = np.abs(far.values - 1.0)[:, (far.gamma > 82.0) & (far.gamma < 90.0)]
+    assert before.max() < 0.04
+    assert beside.min() > 0.04
+    assert (off < LARGEST_Z * beside).all()

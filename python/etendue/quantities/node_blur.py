@@ -22,11 +22,12 @@ SURE = 4.0
 DIM = 0.02
 """Share of the peak below which rows may be too dark for the steps that their light needs."""
 
-THIRD = (1.0, 3.0, 3.0, 1.0)
-"""Weights, but for their signs, of four values in the change from one second difference to the next."""
+SECOND, THIRD = (1.0, 2.0, 1.0), (1.0, 3.0, 3.0, 1.0)
+"""Weights, but for their signs, of three values in a second difference, and of four in the change from one to the next."""
 
 SHARED = 12.5 / 20.0
-"""Variance of that change, in units of that of values without correlation: that of neighbours is ¼."""
+"""Variance of that change, in units of that of values without correlation: that of neighbours is ¼. Of second
+differences it is ⅔."""
 
 
 class Blur(NamedTuple):
@@ -123,28 +124,37 @@ def _hat_bias(before: Array, value: Array, after: Array, gamma: Array) -> Array:
 def _along(gamma: Array, at: int, values: Array, errors: Array) -> Array:
     """The error that kinks and edges make along γ at row `at` of up to five."""
     gaps = np.diff(gamma)[:, None]
-    bend = 2.0 * np.diff(np.diff(values, axis=0) / gaps, axis=0) / (gaps[1:] + gaps[:-1])
     step = (gamma[at + 1] - gamma[at - 1]) / 2.0
-    found = np.zeros(values.shape[1])
-    for first, change in enumerate(np.diff(bend, axis=0) * step**2):
-        found = np.maximum(found, _edge(change, errors[first : first + 4]))
-    return found
+    bend = 2.0 * np.diff(np.diff(values, axis=0) / gaps, axis=0) / (gaps[1:] + gaps[:-1]) * step**2
+    changes = [_beyond_noise(change, errors[k : k + 4], THIRD) for k, change in enumerate(np.diff(bend, axis=0))]
+    own = _beyond_noise(bend[at - 1], errors[at - 1 : at + 2], SECOND)
+    return _edge(own, np.min(changes, axis=0, initial=np.inf), np.max(changes, axis=0, initial=0.0))
 
 
 def _round(values: Array, errors: Array) -> Array:
     """The error that kinks and edges make along a row."""
-    third = (
-        np.diff(np.concatenate([values[-2:], values, values[:2]]), 3) if values.size > 3 else np.zeros(values.size + 1)
-    )
-    padded = np.concatenate([errors[-2:], errors, errors[:2]]) if values.size > 3 else np.zeros(values.size + 4)
-    each = _edge(third, np.stack([padded[k : k + third.size] for k in range(4)]))
-    return np.maximum(each[:-1], each[1:])
+    if values.size < 4:
+        return np.zeros(values.size)
+    padded, padded_errors = (np.concatenate([row[-2:], row, row[:2]]) for row in (values, errors))
+    beside = np.stack([padded_errors[k : k + values.size + 1] for k in range(4)])
+    change = _beyond_noise(np.diff(padded, 3), beside, THIRD)
+    own = _beyond_noise(np.diff(padded[1:-1], 2), beside[:3, 1:], SECOND)
+    return _edge(own, np.minimum(change[:-1], change[1:]), np.maximum(change[:-1], change[1:]))
 
 
-def _edge(change: Array, errors: Array) -> Array:
-    """`EDGE` times the part of changes that is more than their noise; errors of the four values, shape (4, n)."""
-    variance = SHARED * (np.array(THIRD) ** 2) @ errors**2
-    return np.asarray(EDGE * np.sqrt(np.maximum(change**2 - SURE**2 * variance, 0.0)))
+def _edge(own: Array, least: Array, most: Array) -> Array:
+    """The error of a node, from its second difference and from the changes of that to the nodes beside it.
+
+    An edge or a kink beyond the nodes beside it changes these, and leaves the second difference of the node small. One at
+    the node itself may leave that small as well, but changes it to both sides.
+    """
+    return np.asarray(EDGE * np.minimum(most, np.maximum(least, own)))
+
+
+def _beyond_noise(difference: Array, errors: Array, weights: tuple[float, ...]) -> Array:
+    """The part of differences that is more than their noise; errors of the values, shape (values, n)."""
+    variance = SHARED * (np.array(weights) ** 2) @ errors**2
+    return np.asarray(np.sqrt(np.maximum(difference**2 - SURE**2 * variance, 0.0)))
 
 
 def hidden_shapes(gamma: Array, c: tuple[tuple[float, ...], ...], planes: Array, values: Array, errors: Array) -> Array:
