@@ -31,6 +31,12 @@ class NodeSums(NamedTuple):
         Number of the row, and angle C [°].
     flux, error : array, shape (nodes,)
         Σ w φ, and √(Σ (w φ)²); NaN, or anything, where no ray came.
+
+    Examples
+    --------
+    >>> gamma, row, c = np.array([0.0, 90.0, 180.0]), np.array([0, 1, 1, 2]), np.array([0.0, 0.0, 180.0, 0.0])
+    >>> NodeSums(gamma, row, c, flux=np.array([1.0, 2, 2, 0]), error=np.array([0.1, 0.2, 0.2, np.nan])).flux.sum()
+    np.float64(5.0)
     """
 
     gamma: Array

@@ -31,7 +31,13 @@ differences it is ⅔."""
 
 
 class Blur(NamedTuple):
-    """What nodes blur, row by row, each of shape (nodes,)."""
+    """What nodes blur, row by row, each of shape (nodes,).
+
+    Examples
+    --------
+    >>> Blur(off=np.array([0.1]), edge=np.array([0.0]), dark=np.array([False])).off.tolist()
+    [0.1]
+    """
 
     off: Array
     """The mean around the node less the intensity at it, as far as the curvature of the light tells."""
