@@ -51,9 +51,11 @@ def intensity_distribution(
     -------
     Intensity
         [cd] for rays in lm, [W/sr] for rays in W. Its `standard_error` is √(Σ (w φ)²) over the solid angle, with the share
-        φ of the node in a ray of flux w; NaN for a node that no ray reached, whose intensity is 0. With chosen steps of γ,
-        it is the value at least of a node beside such ones, where light ends, and where light rises from a dark pole it
-        holds what the mean is off from the intensity at the node. `flux_error` is √(Σ w²).
+        φ of the node in a ray of flux w, but no less than that of as many rays of the flux that rays around have, and one
+        more (`etendue.quantities.few_rays`); NaN for a node that no ray reached, whose intensity is 0. With chosen steps of
+        γ, it holds what the mean is off from the intensity at the node, where the light shows it
+        (`etendue.quantities.node_blur`), and is the value at least of a node beside dark ones, where light ends.
+        `flux_error` is √(Σ w²).
         ``luminaire["spectrum"]`` is that of all rays together, if they have one, whatever their directions.
         Copies of a ray, which have its place and direction, are one ray with the flux of all. The notes tell of them, and
         if the steps cannot hold a beam.

@@ -239,7 +239,7 @@ class EtendueDensity:
     @property
     def spectrum_is_mean(self) -> bool:
         """Whether the rays had different wavelengths, of which the field only knows the distribution."""
-        return isinstance(self.spectrum, SpectralLines) and self.spectrum.wavelength.size > 1
+        return isinstance(self.spectrum, SpectralLines) and self.spectrum.is_mean
 
     def content(self) -> dict[str, Any]:
         """The attributes by name."""

@@ -104,9 +104,9 @@ class LightField(EtendueDensity, InNotebook):
         Intensity
             Its `standard_error` is that of another route than the error bars of the field, whose correlation from cell to
             cell is not known: √(Φ/n ∫φ² I dΩ)/∫φ dΩ, the counting error that n equal rays of the field's flux Φ have in a
-            node of hat φ, n being those that the field rests on with the images of its symmetry. The field smooths and is
-            mostly better than that; where it broadens a beam, a note says that the peak is too low. The field's notes are
-            among the table's.
+            node of hat φ, and that of one ray more, n being those that the field rests on with the images of its symmetry.
+            The field smooths and is mostly better than that; where it broadens a beam, a note says that the peak is too low.
+            The field's notes are among the table's.
 
         Raises
         ------

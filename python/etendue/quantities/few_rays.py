@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from etendue.quantities.angle_table import hat_integrals
+from etendue.quantities.quadrature import gauss_legendre
 
 Array = npt.NDArray[np.float64]
 
@@ -16,8 +17,6 @@ ENOUGH = 8.0
 
 SECTORS = 64
 """Parts around the axis in which the flux of a ray is looked for first, row by row; then in half as many, of two rows."""
-
-POINTS, WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 class NodeSums(NamedTuple):
@@ -92,8 +91,9 @@ def _square_share(gamma: Array) -> Array:
     [0.5, 0.667]
     """
     low, width = np.radians(gamma[:-1])[:, None], np.radians(np.diff(gamma))[:, None]
-    up = (POINTS + 1.0) / 2.0
-    belt = np.sin(low + width * up) * width * WEIGHTS / 2.0
+    nodes, weights = gauss_legendre(8)
+    up = (nodes + 1.0) / 2.0
+    belt = np.sin(low + width * up) * width * weights / 2.0
     squares = np.zeros(gamma.size)
     squares[:-1] += (belt * (1.0 - up) ** 2).sum(axis=1)
     squares[1:] += (belt * up**2).sum(axis=1)

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-Rows = list[Array]
 
 EDGE = 0.5
 """Largest error of a mean beside a kink or an edge, in units of the change from one second difference to the next. Where the

@@ -56,6 +56,11 @@ class SpectralLines:
         object.__setattr__(self, "weight", table.weight)
 
     @property
+    def is_mean(self) -> bool:
+        """Whether these are the colours of several rays together, each of which may have another one."""
+        return self.wavelength.size > 1
+
+    @property
     def luminous_efficacy(self) -> float:
         """K = K_m Σ Φ_e V(λ) / Σ Φ_e [lm/W] (theory eq. 25); 0 if lumens are stated where V(λ) is 0."""
         efficacy = LUMINOUS_EFFICACY_MAX * photopic_efficiency(self.wavelength)

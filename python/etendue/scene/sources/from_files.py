@@ -21,7 +21,7 @@ from etendue.quantities.distinct_rays import DistinctRays
 from etendue.quantities.intensity import Intensity
 from etendue.quantities.ray_set import RaySet
 from etendue.quantities.ray_stream import RayStream
-from etendue.scene.sources.intensity_tables import check_origin, has_table, is_mean, read_table, table_record
+from etendue.scene.sources.intensity_tables import check_origin, has_table, read_table, spectrum_is_mean, table_record
 from etendue.scene.sources.source import Emitter, Record, Source
 from etendue.units import FluxUnit
 
@@ -260,5 +260,5 @@ class Point(Source):
             table = Intensity(np.zeros(1), np.array([0.0, 180.0]), np.ones((1, 2)), flux_unit=self.flux_unit or "lm")
         flux = table.flux if self.flux is None else self.flux
         record = {"kind": "point", **table_record(table), "flux": flux}
-        mean = is_mean(table) and not self.states_colours
+        mean = spectrum_is_mean(table) and not self.states_colours
         return (Emitter(record, table.flux_unit, table.luminaire.get("spectrum"), mean=mean),)

@@ -103,18 +103,17 @@ def table_record(table: Intensity) -> dict[str, Any]:
     return {"gamma": np.radians(table.gamma), "c": np.radians(table.c), "values": np.array(table.values)}
 
 
-def is_mean(table: Intensity) -> bool:
+def spectrum_is_mean(table: Intensity) -> bool:
     """Whether the spectrum of a distribution is that of rays of several colours, which may go into different directions.
 
     Examples
     --------
-    >>> from etendue.quantities.spectral_lines import SpectralLines
     >>> rays = Intensity([0], [0, 180], [[1.0, 1]], luminaire={"spectrum": SpectralLines([450, 600], [1, 2])})
-    >>> is_mean(rays)
+    >>> spectrum_is_mean(rays)
     True
     """
     spectrum = table.luminaire.get("spectrum")
-    return isinstance(spectrum, SpectralLines) and spectrum.wavelength.size > 1
+    return isinstance(spectrum, SpectralLines) and spectrum.is_mean
 
 
 def front_of(table: Intensity) -> Intensity:

@@ -20,7 +20,14 @@ from etendue.quantities.powers_of_ten import counted
 from etendue.scene.shapes import SHAPES
 from etendue.scene.shapes.flat import FLAT, Plane
 from etendue.scene.shapes.shape import WHOLE, Shape, Trim, is_bounded
-from etendue.scene.sources.intensity_tables import check_origin, front_of, has_table, is_mean, read_table, table_record
+from etendue.scene.sources.intensity_tables import (
+    check_origin,
+    front_of,
+    has_table,
+    read_table,
+    spectrum_is_mean,
+    table_record,
+)
 from etendue.scene.sources.source import Emitter, Source
 from etendue.units import FluxUnit
 
@@ -133,7 +140,7 @@ class Surface(Source):
                 table.flux_unit,
                 table.luminaire.get("spectrum"),
                 flux_notes=tuple(notes),
-                mean=is_mean(table) and not self.states_colours,
+                mean=spectrum_is_mean(table) and not self.states_colours,
             ),
         )
 

@@ -79,29 +79,34 @@ fn samples_have_their_shares_and_density() {
     });
 }
 
-#[test]
-fn many_rays_are_drawn_for_as_each_by_itself() {
-    let (stream, n) = (Stream::new(41, 0), 300_usize);
+/// Draws for rays together and for each by itself: the same to the bit.
+fn assert_drawn_alike(example: &Example, incident: Vec<Vec3>, media: &[Media], stream: &Stream) {
+    let Example { name, bsdf, .. } = example;
+    let n = incident.len();
     let numbers = [0, 1].map(|k| (0..n).map(|i| stream.uniforms(i as u64, 0)[k]).collect::<Vec<f64>>());
     let numbers = numbers.each_ref().map(|list| &list[..]);
+    let mut found = [0, 1, 2].map(|axis| incident.iter().map(|d| [d.x, d.y, d.z][axis]).collect::<Vec<f64>>());
+    let (mut expected, mut outcomes) = (found.clone(), vec![Outcome::Absorbed; n]);
+    bsdf.sample_many(&mut found, media, numbers, &mut outcomes);
+    for (i, incident) in incident.into_iter().enumerate() {
+        let alone = bsdf.sample(incident, &media[i], numbers.map(|list| list[i]));
+        assert_eq!(outcomes[i], alone.keep(&mut expected, i), "{name}");
+        let [found, expected] = [&found, &expected].map(|lists| lists.each_ref().map(|list| list[i]));
+        assert!(found == expected || outcomes[i] == Outcome::Absorbed, "{name}");
+    }
+}
+
+#[test]
+fn many_rays_are_drawn_for_as_each_by_itself() {
     // More than are ever worked on together; from both sides, and from either alone.
-    for Example { name, bsdf, .. } in kinds().iter().flatten() {
+    let media: Vec<Media> = (0..300).map(|i| MEDIA[i % MEDIA.len()]).collect();
+    for example in kinds().iter().flatten() {
         for side in [0.0, 1.0, -1.0] {
             let towards = |i: usize| {
                 let height = HEIGHTS[i % HEIGHTS.len()];
                 direction(if side == 0.0 { height } else { height.abs() * side }, 0.137 * i as f64)
             };
-            let incident: Vec<Vec3> = (0..n).map(towards).collect();
-            let media: Vec<Media> = (0..incident.len()).map(|i| MEDIA[i % MEDIA.len()]).collect();
-            let mut found = [0, 1, 2].map(|axis| incident.iter().map(|d| [d.x, d.y, d.z][axis]).collect::<Vec<f64>>());
-            let (mut expected, mut outcomes) = (found.clone(), vec![Outcome::Absorbed; incident.len()]);
-            bsdf.sample_many(&mut found, &media, numbers, &mut outcomes);
-            for (i, incident) in incident.into_iter().enumerate() {
-                let alone = bsdf.sample(incident, &media[i], numbers.map(|list| list[i]));
-                assert_eq!(outcomes[i], alone.keep(&mut expected, i), "{name}");
-                let [found, expected] = [&found, &expected].map(|lists| lists.each_ref().map(|list| list[i]));
-                assert!(found == expected || outcomes[i] == Outcome::Absorbed, "{name}");
-            }
+            assert_drawn_alike(example, (0..300).map(towards).collect(), &media, &Stream::new(41, 0));
         }
     }
 }
@@ -109,21 +114,9 @@ fn many_rays_are_drawn_for_as_each_by_itself() {
 #[test]
 fn many_grazing_rays_are_drawn_for_as_each_by_itself() {
     // Most directions off a lobe that the horizon cuts are drawn again: more rays wait than are worked on together.
-    let (stream, n) = (Stream::new(43, 0), 2000_usize);
-    let numbers = [0, 1].map(|k| (0..n).map(|i| stream.uniforms(i as u64, 0)[k]).collect::<Vec<f64>>());
-    let numbers = numbers.each_ref().map(|list| &list[..]);
-    for Example { name, bsdf, .. } in kinds().iter().flatten() {
-        let incident: Vec<Vec3> = (0..n).map(|i| direction(0.02, 0.137 * i as f64)).collect();
-        let media = vec![MEDIA[0]; n];
-        let mut found = [0, 1, 2].map(|axis| incident.iter().map(|d| [d.x, d.y, d.z][axis]).collect::<Vec<f64>>());
-        let (mut expected, mut outcomes) = (found.clone(), vec![Outcome::Absorbed; n]);
-        bsdf.sample_many(&mut found, &media, numbers, &mut outcomes);
-        for (i, incident) in incident.into_iter().enumerate() {
-            let alone = bsdf.sample(incident, &media[i], numbers.map(|list| list[i]));
-            assert_eq!(outcomes[i], alone.keep(&mut expected, i), "{name}");
-            let [found, expected] = [&found, &expected].map(|lists| lists.each_ref().map(|list| list[i]));
-            assert!(found == expected || outcomes[i] == Outcome::Absorbed, "{name}");
-        }
+    for example in kinds().iter().flatten() {
+        let incident = (0..2000).map(|i| direction(0.02, 0.137 * f64::from(i))).collect();
+        assert_drawn_alike(example, incident, &vec![MEDIA[0]; 2000], &Stream::new(43, 0));
     }
 }
 
